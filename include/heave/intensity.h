@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * intensity.h - scales a sender's motion about neutral, 0 to 100 %; changes follow a jerk-limited ramp.
- * Scales references, not set-points: limits, workspace and take-over are applied afterwards. Owns no clock and no I/O.
+ * Scales references, not set-points: limits, workspace and fade-in are applied afterwards. Owns no clock and no I/O.
  */
 #ifndef HEAVE_INTENSITY_H
 #define HEAVE_INTENSITY_H

@@ -12,16 +12,6 @@
 #include "heave/excitation.h"
 #include "heave/ramp.h"
 
-/** The jog or test signal in progress, one at a time; members are private to src/motion. */
-typedef struct {
-    bool is_serving;
-    bool is_posed;         /**< along a pose axis, not a cylinder */
-    bool is_excited;       /**< a test signal, not a jog */
-    excitation_t signal;   /**< valid if is_excited */
-    uint32_t led;          /**< bit i: this cylinder (AXIS_ANGLE: the rotation motor) is moved, or has not come to rest yet */
-    ramp_t ramp[AXES_MAX]; /**< limiters of the moved axes; their bounds include the position where the jog began */
-} jog_t;
-
 /** Limits of jogs and test signals. */
 typedef struct {
     ramp_limits_t cylinder; /**< of every cylinder; the position bounds differ for each */
@@ -29,6 +19,17 @@ typedef struct {
     q32_t signal_mm_q32, signal_deg_q32; /**< widest test signal */
     q32_t signal_mm_per_cycle_q32;       /**< largest cylinder speed in a test signal; its other limits are those of a ride */
 } jog_limits_t;
+
+/** The jog or test signal in progress, one at a time; members are private to src/motion. */
+typedef struct {
+    jog_limits_t limits;
+    bool is_serving;
+    bool is_posed;         /**< along a pose axis, not a cylinder */
+    bool is_excited;       /**< a test signal, not a jog */
+    excitation_t signal;   /**< valid if is_excited */
+    uint32_t moved;        /**< bit i: this cylinder (AXIS_ANGLE: the rotation motor) is moved, or has not come to rest yet */
+    ramp_t ramp[AXES_MAX]; /**< limiters of the moved axes; their bounds include the position where the jog began */
+} jog_t;
 
 struct motion;
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * motion.h - calculates the set-points of each cycle from the commands, within the limits of every axis and cylinder.
- * Order: source (step, stream, timed move, path, stop) -> intensity -> ramps of the pose axes -> workspace -> inverse kinematics
- * -> take-over blend -> limiter of each cylinder. Nothing reaches an output except through a ramp (ramp.h). Owns no clock and no
- * I/O.
+ * Order: source (stream, planned path, stop, jog) -> intensity -> fade-in -> ramps of the pose axes -> workspace -> inverse
+ * kinematics -> limiter of each cylinder. Nothing reaches an output except through a ramp (ramp.h). Owns no clock and no I/O.
  */
 #ifndef HEAVE_MOTION_H
 #define HEAVE_MOTION_H
@@ -73,7 +72,7 @@ void motion_rise(motion_t *self);
 /** Follows targets from now on. Moves to the first one from rest, at engage speed. */
 void motion_follow(motion_t *self);
 
-/** Takes a target while following (else it is ignored).
+/** Accepts a target while following (else it is ignored).
  *  @return HV_OK; HV_ERR_RANGE for extensions that no pose has, or only one near a singularity (KIN_MARGIN_LEAST_Q32):
  *          nothing changes. */
 hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us) HV_MUST_CHECK;
@@ -114,6 +113,9 @@ uint32_t motion_singular_stops(const motion_t *self);
 
 /** Extensions at which people board. */
 const q32_t *motion_settled_extension(const motion_t *self);
+
+/** The pose that belongs to the set-points; the last one that was known where none does. */
+const pose_t *motion_pose(const motion_t *self);
 
 /** The mechanism, for feedback. */
 const kin_t *motion_kin(const motion_t *self);

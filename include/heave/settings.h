@@ -79,7 +79,7 @@ typedef struct {
 
     q16_t engage_speed_mm_s_q16;
     q16_t engage_accel_mm_s2_q16;
-    q16_t jog_mm_s_q16;                  /**< no cylinder is faster while it is led by hand; 0: none is led */
+    q16_t jog_mm_s_q16;                  /**< no cylinder is faster while it is moved by hand; 0: none can be moved */
     q16_t jog_deg_s_q16;                 /**< nor a rotation */
     q16_t signal_mm_q16, signal_deg_q16; /**< no test signal is wider, from its middle to one side */
     q16_t signal_mm_s_q16;               /**< no cylinder is faster in one */

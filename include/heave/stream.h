@@ -308,6 +308,29 @@ void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t 
  *  @return false while no sample has come since reset (ref unchanged). */
 bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *ref);
 
+/** Phase of the stream. */
+static inline stream_phase_t stream_phase(const stream_t *self)
+{
+    return self->phase;
+}
+
+/** Resolution of the sender's values on an axis; 0: none, or too fine to matter. */
+static inline q32_t stream_quantum_q32(const stream_t *self, unsigned axis)
+{
+    return self->curve.quantum[axis].quantum_q32;
+}
+
+/** True while the samples ask for more acceleration, or more speed, than the limits allow, and are made smaller. */
+static inline bool stream_is_smoothed(const stream_t *self)
+{
+    return self->curve.governor.strength_q32 >= 2 * Q32_ONE;
+}
+
+static inline bool stream_is_slowed(const stream_t *self)
+{
+    return self->curve.governor.is_slowed;
+}
+
 /** True while samples come regularly: period known, last arrival at most STREAM_QUIET_US or 3.5 periods ago. */
 bool stream_is_live(const stream_t *self, uint64_t now_us);
 

@@ -70,7 +70,7 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     self->snapshot.cylinders = self->cylinders;
     self->snapshot.has_angle = settings->has_angle;
     self->snapshot.relay_count = settings->relays.count;
-    self->snapshot.sent = self->motion.pose;
+    self->snapshot.sent = *motion_pose(&self->motion);
     self->sender.frame_mask = settings->relay_safe_mask;
     return HV_OK;
 }

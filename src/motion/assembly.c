@@ -6,7 +6,7 @@
 #define AHEAD_Q32 q32_from_int(5)
 
 /* Whether extensions have a pose near another one, with the margin. */
-static bool is_held_near(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess)
+static bool is_held_near(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess)
 {
     pose_t pose;
     return kin_forward(&self->kin, extension_mm_q32, guess, &pose, NULL) == HV_OK &&
@@ -14,7 +14,7 @@ static bool is_held_near(const motion_t *self, const q32_t extension_mm_q32[CYLI
 }
 
 /* Whether extensions have a pose near where the platform is, with the margin or with more than there is here. */
-static bool is_held_or_better(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+static bool is_held_or_better(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
 {
     pose_t pose;
     return kin_forward(&self->kin, extension_mm_q32, &self->pose, &pose, NULL) == HV_OK &&
@@ -23,7 +23,7 @@ static bool is_held_or_better(const motion_t *self, const q32_t extension_mm_q32
 }
 
 /* A little way from the set-points towards extensions, straight. */
-static void look_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t ahead_mm_q32[CYLINDERS_MAX])
+static void look_ahead(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t ahead_mm_q32[CYLINDERS_MAX])
 {
     q32_t longest_q32 = AHEAD_Q32;
     for (unsigned i = 0; i < self->cylinders; i++) {
@@ -37,22 +37,22 @@ static void look_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLIND
 }
 
 /* Whether the first step there is possible. */
-static bool is_held_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+static bool is_held_ahead(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
 {
     q32_t ahead_mm_q32[CYLINDERS_MAX] = {0};
     look_ahead(self, extension_mm_q32, ahead_mm_q32);
     return is_held_or_better(self, ahead_mm_q32);
 }
 
-bool assembly_is_held(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+bool assembly_is_held(const platform_t *self, bool is_beginning, const q32_t extension_mm_q32[CYLINDERS_MAX])
 {
-    if (self->is_taking_over && !is_held_ahead(self, extension_mm_q32)) {
+    if (is_beginning && !is_held_ahead(self, extension_mm_q32)) {
         return false;
     }
     return is_held_near(self, extension_mm_q32, &self->pose) || is_held_near(self, extension_mm_q32, &self->neutral);
 }
 
-bool assembly_can_stop(const motion_t *self)
+bool assembly_can_stop(const platform_t *self)
 {
     ramp_state_t start[CYLINDERS_MAX];
     const ramp_limits_t *limits[CYLINDERS_MAX];

@@ -7,13 +7,14 @@
 
 #include "heave/motion.h"
 
-/** Whether a pose with the margin belongs to the extensions. At a take-over, as after a stop before a singularity, also whether
- *  the first 5 mm of the straight way there are held, so that a sender that insists does not make the platform try again. */
-bool assembly_is_held(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX]);
+/** Whether a pose with the margin belongs to the extensions.
+ *  @param is_beginning at the first target of a sender, as after a stop before a singularity, the first 5 mm of the straight way
+ *  there have to be held too, so that a sender that insists does not make the platform try again */
+bool assembly_is_held(const platform_t *self, bool is_beginning, const q32_t extension_mm_q32[CYLINDERS_MAX]);
 
 /** Whether a stop begun a cycle from now would end in such an assembly, or in a better one than this where this is none already.
  *  On the way between two targets nothing else asks: cylinders that go straight in their own space may lead the plate anywhere.
  */
-bool assembly_can_stop(const motion_t *self);
+bool assembly_can_stop(const platform_t *self);
 
 #endif

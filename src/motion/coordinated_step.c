@@ -14,16 +14,16 @@
 #define GAIN_MOST   (Q16_ONE / 16)   /* of the common brake, per cycle: that of a soft ramp */
 #define GAIN_LEAST  (Q16_ONE / 4096) /* less is no brake */
 
-/* A cylinder's differences after a cycle that leads it to a place. */
-static ramp_ref_t led_to(const history_t *from, q32_t extension_mm_q32)
+/* A cylinder's reference in the next cycle, at this extension. */
+static ramp_ref_t reference_at(const history_t *from, q32_t extension_mm_q32)
 {
     const q32_t vel_q32 = extension_mm_q32 - from->pos_q32;
     const q32_t acc_q32 = vel_q32 - from->vel_per_cycle_q32;
     return (ramp_ref_t){extension_mm_q32, vel_q32, acc_q32, acc_q32 - from->acc_per_cycle2_q32};
 }
 
-/* Where accelerations of the axes lead. */
-static void lead(const motion_t *self, const q32_t acc_q32[POSE_AXES], coordinated_step_t *to)
+/* Where the platform is after a cycle with these accelerations of the axes. */
+static void next_position(const platform_t *self, const q32_t acc_q32[POSE_AXES], coordinated_step_t *to)
 {
     for (unsigned i = 0; i < POSE_AXES; i++) {
         const ramp_state_t *at = &self->axis[i].state;
@@ -33,20 +33,20 @@ static void lead(const motion_t *self, const q32_t acc_q32[POSE_AXES], coordinat
     to->limiting_cylinder = workspace_pull_in(self, &to->pose, to->extension_mm_q32, NULL);
 }
 
-static bool can_follow(const ramp_t *cylinder, const ramp_ref_t *led)
+static bool can_follow(const ramp_t *cylinder, const ramp_ref_t *ref)
 {
     const ramp_limits_t *limits = &cylinder->limits;
-    const q32_t acc_q32 = fx_abs(led->acc_per_cycle2_q32);
-    const q32_t towards_q32 = led->acc_per_cycle2_q32 < 0 ? -led->vel_per_cycle_q32 : led->vel_per_cycle_q32;
-    return fx_abs(led->jerk_per_cycle3_q32) <= limits->jerk_per_cycle3_q32 && acc_q32 <= cylinder->acc_safe_q32 &&
+    const q32_t acc_q32 = fx_abs(ref->acc_per_cycle2_q32);
+    const q32_t towards_q32 = ref->acc_per_cycle2_q32 < 0 ? -ref->vel_per_cycle_q32 : ref->vel_per_cycle_q32;
+    return fx_abs(ref->jerk_per_cycle3_q32) <= limits->jerk_per_cycle3_q32 && acc_q32 <= cylinder->acc_safe_q32 &&
            brake_keeps_velocity(cylinder, towards_q32, acc_q32, limits->vel_per_cycle_q32);
 }
 
-static bool can_all_follow(const motion_t *self, const coordinated_step_t *to)
+static bool can_all_follow(const platform_t *self, const coordinated_step_t *to)
 {
     for (unsigned i = 0; i < self->cylinders; i++) {
-        const ramp_ref_t led = led_to(&self->reference[i], to->extension_mm_q32[i]);
-        if (!can_follow(&self->cylinder[i], &led)) {
+        const ramp_ref_t ref = reference_at(&self->reference[i], to->extension_mm_q32[i]);
+        if (!can_follow(&self->cylinder[i], &ref)) {
             return false;
         }
     }
@@ -69,7 +69,7 @@ static int64_t gain_borne(const ramp_t *ramp, const ramp_state_t *at, int64_t ga
 }
 
 /* The accelerations with which all axes brake together. */
-static void brake_together(motion_t *self, q32_t acc_q32[POSE_AXES])
+static void brake_together(platform_t *self, q32_t acc_q32[POSE_AXES])
 {
     int64_t gain_q16 = GAIN_MOST;
     for (unsigned i = 0; i < POSE_AXES; i++) {
@@ -102,7 +102,7 @@ static q32_t most_jerk(const ramp_t *cylinder, const history_t *from, int sign)
 static int64_t share_followed(const ramp_t *cylinder, const history_t *from, q32_t braked_q32, q32_t wanted_q32, int64_t share)
 {
     const int sign = wanted_q32 < braked_q32 ? -1 : 1;
-    const q32_t room_q32 = most_jerk(cylinder, from, sign) - sign * led_to(from, braked_q32).jerk_per_cycle3_q32;
+    const q32_t room_q32 = most_jerk(cylinder, from, sign) - sign * reference_at(from, braked_q32).jerk_per_cycle3_q32;
     const q32_t way_q32 = sign * (wanted_q32 - braked_q32);
     if (way_q32 <= room_q32) {
         return share;
@@ -112,13 +112,13 @@ static int64_t share_followed(const ramp_t *cylinder, const history_t *from, q32
 }
 
 /* Cuts what the axes want, all by one share. */
-static void cut(motion_t *self, q32_t acc_q32[POSE_AXES], coordinated_step_t *to)
+static void cut(platform_t *self, q32_t acc_q32[POSE_AXES], coordinated_step_t *to)
 {
     q32_t braked_q32[POSE_AXES];
     coordinated_step_t braked;
     int64_t share = SHARE_FULL;
     brake_together(self, braked_q32);
-    lead(self, braked_q32, &braked);
+    next_position(self, braked_q32, &braked);
     if (braked.limiting_cylinder != 0) {
         return;
     }
@@ -129,14 +129,14 @@ static void cut(motion_t *self, q32_t acc_q32[POSE_AXES], coordinated_step_t *to
     for (unsigned i = 0; i < POSE_AXES; i++) {
         acc_q32[i] = braked_q32[i] + fx_mul_shift(acc_q32[i] - braked_q32[i], share, SHARE_SHIFT);
     }
-    lead(self, acc_q32, to);
+    next_position(self, acc_q32, to);
 }
 
-unsigned coordinated_step(motion_t *self, const ramp_ref_t ref[POSE_AXES], ramp_bandwidth_t bandwidth, coordinated_step_t *to)
+unsigned coordinated_step(platform_t *self, const ramp_ref_t ref[POSE_AXES], ramp_bandwidth_t bandwidth, coordinated_step_t *to)
 {
     q32_t acc_q32[POSE_AXES];
     unsigned flags = ramp_aim_all(self->axis, POSE_AXES, ref, bandwidth, acc_q32);
-    lead(self, acc_q32, to);
+    next_position(self, acc_q32, to);
     if (to->limiting_cylinder == 0 && !can_all_follow(self, to)) {
         flags |= RAMP_ACCEL;
         cut(self, acc_q32, to);

@@ -24,6 +24,6 @@ typedef struct {
  *
  *  @param ref   of each pose axis
  *  @return what limited the cycle, RAMP_ACCEL included if the axes were cut */
-unsigned coordinated_step(motion_t *self, const ramp_ref_t ref[POSE_AXES], ramp_bandwidth_t bandwidth, coordinated_step_t *to);
+unsigned coordinated_step(platform_t *self, const ramp_ref_t ref[POSE_AXES], ramp_bandwidth_t bandwidth, coordinated_step_t *to);
 
 #endif

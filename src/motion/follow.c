@@ -3,149 +3,50 @@
  *
  * Poses: references of the pose axes, scaled by intensity -> ramps -> workspace -> inverse kinematics -> references of cylinders.
  * Extensions go to the cylinders as they are. When the space changes, forward kinematics of the last three set-points gives the
- * pose axes their position, velocity and acceleration. At a take-over the references are faded in (fade.h) before the ramps.
+ * pose axes their position, velocity and acceleration. The references of a sender that begins are faded in (fade.h) before the
+ * ramps.
  */
 #include "follow.h"
 
-#include "ref_history.h"
-#include "plan.h"
-#include "jump.h"
-#include "fade_in.h"
-#include "coordinated_step.h"
-#include "active_axis.h"
 #include "axis_targets.h"
+#include "coordinated_step.h"
+#include "fade_in.h"
+#include "followed.h"
+#include "jump.h"
+#include "plan.h"
+#include "platform.h"
+#include "target_times.h"
 
-#define INSTANT_MS     5       /* no move is this short: frames with such a T ... */
-#define INSTANT_GAP_US 20000   /* ... that follow each other so closely are a stream like frames without T */
-#define RETURN_GAP_US  1000000 /* whatever a sender sends after that may be another program's */
-#define PERIODS_STATED 5       /* so many periods a streaming sender may write as T, and more if it does not mean T */
+#define RETURN_GAP_US 1000000 /* whatever a sender sends after that may be another program's */
 
 bool follow_is_moving(const motion_t *self)
 {
-    return self->source >= MOTION_STREAMED;
+    return self->source == MOTION_STREAMED || self->source == MOTION_PLANNED;
 }
 
-/* The poses of the cylinders' last three positions, the newest first. */
-static hv_status_t last_poses(const motion_t *self, pose_t pose[3])
+/* What targets are scaled by, in the space that is followed. */
+static axis_scale_t scale_of(const motion_t *self)
 {
-    const pose_t *guess = &self->pose;
-    for (unsigned age = 0; age < 3; age++) {
-        q32_t extension_mm_q32[CYLINDERS_MAX];
-        for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-            const ramp_state_t *s = &self->cylinder[i].state;
-            const q32_t back_q32 = age == 0   ? 0
-                                   : age == 1 ? s->vel_per_cycle_q32
-                                              : 2 * s->vel_per_cycle_q32 - s->acc_per_cycle2_q32;
-            extension_mm_q32[i] = s->pos_q32 - back_q32;
-        }
-        if (kin_forward(&self->kin, extension_mm_q32, guess, &pose[age], NULL) != HV_OK) {
-            return HV_ERR_RANGE;
-        }
-        guess = &pose[age];
-    }
-    return HV_OK;
+    return (axis_scale_t){&self->platform, &self->intensity, self->followed.space};
 }
 
-/* Position, velocity and acceleration of an axis. */
-static ramp_state_t state_from(const pose_t pose[3], unsigned axis)
+/* The mechanism, where poses are followed. */
+static const kin_t *kin_followed(const motion_t *self)
 {
-    const q32_t now_q32 = pose[0].axis_q32[axis];
-    const q32_t vel_q32 = now_q32 - pose[1].axis_q32[axis];
-    return (ramp_state_t){now_q32, vel_q32, vel_q32 - (pose[1].axis_q32[axis] - pose[2].axis_q32[axis])};
+    return self->followed.space == MOTION_POSE ? &self->platform.kin : NULL;
 }
 
-static void adopt_pose(motion_t *self)
+/* The first references of another space are those of the present set-points. */
+static void enter_space(followed_t *self, platform_t *platform)
 {
-    pose_t pose[3];
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        self->reference[i] = self->cylinder[i].state;
-    }
-    if (last_poses(self, pose) != HV_OK) {
+    const bool is_posed = self->space == MOTION_POSE;
+    self->is_new = false;
+    if (is_posed && !platform_adopt_pose(platform)) {
         return;
     }
-    const bool is_resting = motion_is_at_rest(self);
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const ramp_state_t state = state_from(pose, i);
-        const ramp_state_t at_rest = {.pos_q32 = self->is_axis_moved[i] ? state.pos_q32 : 0};
-        ramp_adopt(&self->axis[i], is_resting || !self->is_axis_moved[i] ? &at_rest : &state);
-        self->led[i] = self->axis[i].state;
+        self->past[i] = is_posed ? platform->axis[i].state : platform->cylinder[i].state;
     }
-}
-
-/* Changes to another space. It starts from the set-points of the present one. */
-static void enter_space(motion_t *self)
-{
-    self->is_space_new = false;
-    if (self->space == MOTION_POSE) {
-        adopt_pose(self);
-        return;
-    }
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        self->led[i] = self->cylinder[i].state;
-    }
-}
-
-/* The time of a target that could be a stream's period, else 0. */
-static uint32_t period_stated(const motion_target_t *target)
-{
-    return target->is_timed && target->time_ms <= STREAM_HINT_MAX_US / 1000 ? target->time_ms * 1000 : 0;
-}
-
-/* Two times are about the same if neither is more than 2.5 times the other. */
-static bool is_about(uint64_t time_us, uint64_t other_us)
-{
-    return time_us * 2 <= other_us * 5 && other_us * 2 <= time_us * 5;
-}
-
-/* A target without a time, or with one too short for a move, after so short a gap that it is none, or where a stream runs that is
- * so quick: a frame of it may be late or lost. */
-static bool is_instant(const motion_t *self, const motion_target_t *target, uint64_t now_us)
-{
-    const uint64_t period_us = stream_goes_on(&self->stream, now_us) ? stream_frame_us(&self->stream) : now_us - self->last_us;
-    return !target->is_timed ||
-           (target->time_ms <= INSTANT_MS && (now_us - self->last_us <= INSTANT_GAP_US || period_us <= INSTANT_GAP_US));
-}
-
-/* Targets that follow each other as quickly and as evenly as those of a stream, whatever time they state. */
-static bool is_in_a_row(const motion_t *self, uint64_t gap_us)
-{
-    return self->last_gap_us > 0 && gap_us <= STREAM_QUIET_US && is_about(gap_us, self->last_gap_us);
-}
-
-/* A timed target is a sample of a stream if its time is about the period of the one that runs, or if it comes at that one's pace
- * and its time is some periods, or not meant; or if targets follow each other in the time that both state, or three evenly. */
-static bool is_stream_sample(const motion_t *self, const motion_target_t *target, uint64_t now_us)
-{
-    const uint32_t stated_us = period_stated(target);
-    const uint64_t gap_us = now_us - self->last_us;
-    if (is_instant(self, target, now_us)) {
-        return true;
-    }
-    if (stated_us == 0) {
-        return false;
-    }
-    if (stream_goes_on(&self->stream, now_us)) {
-        const uint32_t period_us = stream_period_us(&self->stream);
-        const uint32_t interval_us = stream_frame_us(&self->stream);
-        return is_about(stated_us, period_us) || is_about(stated_us, interval_us) ||
-               (gap_us * 2 <= interval_us * 5 && (stated_us <= PERIODS_STATED * period_us || self->is_time_idle));
-    }
-    return is_in_a_row(self, gap_us) || (is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us));
-}
-
-/* What a target says of the sender's period: a time that is not about the interval is a wish of another kind. The first interval
- * may be that of a late frame. */
-static uint32_t period_hinted(const motion_t *self, const motion_target_t *target, uint64_t gap_us)
-{
-    const uint32_t stated_us = period_stated(target);
-    const uint64_t period_us = stream_period_us(&self->stream);
-    if (self->stream.phase == STREAM_EMPTY || self->last_stated_us == 0) {
-        return stated_us;
-    }
-    if (self->stream.phase == STREAM_LONE) {
-        return is_about(stated_us, gap_us) ? stated_us : 0;
-    }
-    return stated_us * 2 <= period_us * 3 && period_us * 2 <= stated_us * 3 ? stated_us : 0;
 }
 
 /* What a ramp can follow. */
@@ -154,43 +55,28 @@ static governor_limits_t limits_of(const ramp_t *ramp)
     return (governor_limits_t){ramp->limits.vel_per_cycle_q32, ramp->acc_safe_q32, ramp->limits.jerk_per_cycle3_q32};
 }
 
-/* The mechanism, where poses are followed. */
-static const kin_t *kin_followed(const motion_t *self)
-{
-    return self->space == MOTION_POSE ? &self->kin : NULL;
-}
-
-governor_limits_t follow_axis_limits(const motion_t *self, unsigned i)
-{
-    const bool is_used = self->space == MOTION_POSE || i == AXIS_ANGLE || i < self->cylinders;
-    return is_used ? limits_of(active_axis_ramp(self, i)) : (governor_limits_t){0};
-}
-
-governor_limits_t follow_cylinder_limits(const motion_t *self, unsigned i)
-{
-    return self->space == MOTION_POSE && i < self->cylinders ? limits_of(&self->cylinder[i]) : (governor_limits_t){0};
-}
-
-/* The slots are those of a space from now on. */
+/* Targets are given in another space from now on. */
 static void change_space(motion_t *self, motion_space_t space)
 {
-    self->space = space;
-    self->is_space_new = true;
-    self->last_stated_us = 0;
-    self->last_gap_us = 0;
-    self->is_time_idle = false;
+    const platform_t *platform = &self->platform;
+    const governor_limits_t none = {0};
+    const bool is_posed = space == MOTION_POSE;
+    self->followed.space = space;
+    self->followed.is_new = true;
     self->source = MOTION_STREAMED;
-    stream_reset(&self->stream);
     self->is_jumping = false;
+    target_times_reset(&self->times);
+    spike_filter_reset(&self->gate);
+    stream_reset(&self->stream);
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        const governor_limits_t limits = follow_axis_limits(self, i);
+        const bool is_used = is_posed || i == AXIS_ANGLE || i < platform->cylinders;
+        const governor_limits_t limits = is_used ? limits_of(followed_ramp(&self->followed, platform, i)) : none;
         stream_set_limits(&self->stream, i, &limits);
     }
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        const governor_limits_t limits = follow_cylinder_limits(self, i);
+        const governor_limits_t limits = is_posed && i < platform->cylinders ? limits_of(&platform->cylinder[i]) : none;
         stream_set_cylinder_limits(&self->stream, i, &limits);
     }
-    spike_filter_reset(&self->gate);
 }
 
 /* True if a pose of a stream is withheld until the next one confirms it. */
@@ -198,7 +84,7 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 {
     const uint32_t period_us = stream_is_live(&self->stream, now_us) ? stream_period_us(&self->stream) : 0;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        spike_filter_set_quantum(&self->gate, i, self->stream.curve.quantum[i].quantum_q32);
+        spike_filter_set_quantum(&self->gate, i, stream_quantum_q32(&self->stream, i));
     }
     if (target->space != MOTION_POSE || spike_filter_passes(&self->gate, now_us, period_us, target->value_q32)) {
         return false;
@@ -210,43 +96,55 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 /* Whether this sample of a stream goes on from a step that the gate has held back. */
 static bool has_jumped(const motion_t *self, bool is_sample)
 {
-    return is_sample && self->gate.is_step && self->space == MOTION_POSE && self->source == MOTION_STREAMED &&
-           !self->is_taking_over && self->stream.phase == STREAM_RUNNING;
+    return is_sample && self->gate.is_step && self->followed.space == MOTION_POSE && self->source == MOTION_STREAMED &&
+           !followed_is_beginning(&self->followed) && stream_phase(&self->stream) == STREAM_RUNNING;
 }
 
-static void accept_jump(motion_t *self, const motion_target_t *target)
+HV_OWN_FRAME static void accept_jump(motion_t *self, const axis_scale_t *scale, const motion_target_t *target)
 {
     q32_t step_q32[POSE_AXES];
+    const jump_in_t in = {scale, &self->followed, self->targets.value_q32, step_q32};
     for (unsigned i = 0; i < POSE_AXES; i++) {
         step_q32[i] = target->value_q32[i] - self->withheld.value_q32[i];
     }
-    jump_accept(self, step_q32);
+    self->is_jumping = jump_accept(&self->plan.jump, self->is_jumping, &in, &self->stream);
+}
+
+/* The stream goes on from where the axes are. */
+HV_OWN_FRAME static void place_stream(motion_t *self, const axis_scale_t *scale)
+{
+    history_t now[AXES_MAX];
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        now[i] = *followed_state(&self->followed, &self->platform, i);
+    }
+    axis_targets_unscale(scale, now);
+    stream_place(&self->stream, now);
 }
 
 /* A sample, or a target by itself. */
 static void accept_target(motion_t *self, const motion_target_t *target, bool is_sample, uint32_t hint_us, uint64_t now_us)
 {
-    axis_targets_accept(self, target, self->slot_q32, self->slot_extension_mm_q32);
+    const uint32_t cycle_us = self->platform.cycle_us;
+    const axis_scale_t scale = scale_of(self);
+    axis_targets_accept(&self->targets, &scale, target);
     self->pending = *target; /* has_pending is set if it has to wait for a stop */
-    self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
-    self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
-    self->is_stretched = false;
+    self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + cycle_us / 2) / cycle_us;
+    self->timed.end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * cycle_us;
+    self->timed.is_stretched = false;
     if (!is_sample) {
         stream_reset(&self->stream);
         spike_filter_reset(&self->gate);
     }
-    if (self->source != MOTION_STREAMED && !self->is_space_new) {
-        history_t now[AXES_MAX];
-        axis_targets_unscaled_states(self, now);
-        stream_place(&self->stream, now);
+    if (self->source != MOTION_STREAMED && !self->followed.is_new) {
+        place_stream(self, &scale);
     }
     if (has_jumped(self, is_sample)) {
-        accept_jump(self, target);
+        accept_jump(self, &scale, target);
     }
-    stream_hide_start(&self->stream, fade_in_is_hidden(self));
+    stream_hide_start(&self->stream, fade_in_is_hidden(&self->fade_in, self->followed.phase));
     stream_hint_period(&self->stream, hint_us);
-    stream_push(&self->stream, now_us, kin_followed(self), self->slot_q32);
-    self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
+    stream_push(&self->stream, now_us, kin_followed(self), self->targets.value_q32);
+    self->due = !is_sample ? DUE_TIMED : stream_phase(&self->stream) == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
 }
 
 /* The timed move that is under way once more: planned anew with each frame of a sender that repeats itself it would never arrive,
@@ -254,7 +152,7 @@ static void accept_target(motion_t *self, const motion_target_t *target, bool is
 static bool is_under_way(const motion_t *self, const motion_target_t *target)
 {
     const motion_target_t *last = &self->pending;
-    bool is_same = self->source > MOTION_STREAMED && self->due == DUE_NOTHING && last->is_timed &&
+    bool is_same = self->source == MOTION_PLANNED && self->due == DUE_NOTHING && last->is_timed &&
                    target->time_ms == last->time_ms && target->has_angle == last->has_angle &&
                    (!target->has_angle || target->angle_deg_q32 == last->angle_deg_q32);
     for (unsigned i = 0; i < POSE_AXES; i++) {
@@ -263,39 +161,45 @@ static bool is_under_way(const motion_t *self, const motion_target_t *target)
     return is_same;
 }
 
-/* What a sender says of the time between its frames, and what it keeps of that. */
-static void note_times(motion_t *self, const motion_target_t *target, uint64_t gap_us, uint64_t now_us)
+/* Stops if moving, and fades the sender in from there, with the pending target. */
+static void fade_in_again(motion_t *self)
 {
-    /* a sender that does not wait for the time it states does not mean it */
-    self->is_time_idle = gap_us <= STREAM_HINT_MAX_US && (self->is_time_idle || gap_us * 5 < self->last_stated_us * UINT64_C(2));
-    const bool is_short = target->is_timed && target->time_ms <= STREAM_HINT_MAX_US / 1000;
-    self->last_gap_us = is_short && gap_us <= STREAM_QUIET_US ? (uint32_t)gap_us : 0;
-    self->last_us = now_us;
-    self->last_stated_us = period_stated(target);
+    self->due = DUE_NOTHING;
+    motion_follow(self);
+    self->has_pending = true;
 }
 
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
-    if (target->space != self->space || !follow_is_moving(self)) {
+    if (target->space != self->followed.space || !follow_is_moving(self)) {
         change_space(self, target->space);
     }
-    const bool is_sample = is_stream_sample(self, target, now_us);
+    const bool is_sample = target_times_is_sample(&self->times, &self->stream, target, now_us);
     /* a move that states its time is as quick as it says */
-    const bool may_return = is_sample || now_us - self->last_us >= RETURN_GAP_US;
-    if (may_return && !self->is_taking_over && stream_returns_elsewhere(&self->stream, now_us, target->value_q32)) {
+    const bool may_return = is_sample || now_us - self->times.last_us >= RETURN_GAP_US;
+    if (may_return && !followed_is_beginning(&self->followed) &&
+        stream_returns_elsewhere(&self->stream, now_us, target->value_q32)) {
         self->pending = *target;
         fade_in_again(self);
-        self->is_return = true;
+        self->fade_in.is_return = true;
         return;
     }
-    const uint64_t gap_us = now_us - self->last_us;
-    const uint32_t hint_us = period_hinted(self, target, gap_us);
-    note_times(self, target, gap_us, now_us);
+    const uint32_t hint_us = target_times_hint_us(&self->times, &self->stream, target, now_us);
+    target_times_note(&self->times, target, now_us);
     if (!is_sample && is_under_way(self, target)) {
         return;
     }
     if (!is_sample || !is_withheld(self, target, now_us)) {
         accept_target(self, target, is_sample, hint_us, now_us);
+    }
+}
+
+void follow_begin(motion_t *self, uint64_t now_us)
+{
+    self->followed.phase = FOLLOW_AWAITED;
+    if (self->has_pending) {
+        self->has_pending = false;
+        follow_target(self, &self->pending, now_us);
     }
 }
 
@@ -309,32 +213,63 @@ static void accept_withheld(motion_t *self, uint64_t now_us)
     }
 }
 
-/* A step to the end of the present plan. */
+/* A step to the end of the present path. */
 static bool is_on_the_way(const motion_t *self)
 {
-    const q32_t *to_q32 = self->source == MOTION_TIMED ? self->plan.quintic.target_q32 : self->plan.straight.to_q32;
+    const path_t *path = &self->plan.path;
+    const axis_scale_t scale = scale_of(self);
     unsigned i = 0;
-    if (self->source != MOTION_TIMED && self->source != MOTION_STRAIGHT) {
+    if (self->source != MOTION_PLANNED || path->kind == PATH_STOP_AND_STRAIGHT) {
         return false;
     }
-    while (i < self->planned_slots && to_q32[i] == self->goal_q32[i]) {
+    while (i < path->axes && path_end(path)[i] == self->targets.goal_q32[i]) {
         i++;
     }
-    return i == self->planned_slots && axis_targets_is_planned(self, self->slot_q32);
+    return i == path->axes && axis_targets_is_planned(&self->targets, &scale, path->axes);
 }
 
 /* Before the plan: the axes of its space, and a sender that is still to be faded in. */
 static void prepare_plan(motion_t *self, motion_due_t due, bool is_first)
 {
-    if (self->is_space_new) {
-        enter_space(self);
+    followed_t *followed = &self->followed;
+    if (followed->is_new) {
+        enter_space(followed, &self->platform);
     }
-    axis_targets_scale(self, self->space, self->slot_q32, self->goal_q32);
+    const axis_scale_t scale = scale_of(self);
+    axis_targets_scale(&scale, self->targets.value_q32, self->targets.goal_q32);
     if (is_first) {
-        fade_in_begin(self);
+        fade_in_begin(&self->fade_in, &self->platform, followed->space);
+        followed->phase = FOLLOW_FADING_IN;
     }
-    if (self->is_fading) {
-        fade_in_aim(self, due != DUE_STREAM);
+    if (followed->phase == FOLLOW_FADING_IN) {
+        fade_in_aim(&self->fade_in, &self->platform, followed->space, due != DUE_STREAM ? self->targets.goal_q32 : NULL);
+    }
+}
+
+static void plan_move(motion_t *self, bool is_first, uint64_t now_us)
+{
+    const plan_in_t in = {&self->platform, &self->followed, &self->targets, &self->intensity};
+    const int64_t asked = self->asked_cycles;
+    const int64_t planned = plan_timed(&in, asked > 0 ? asked : 1, &self->plan.path);
+    const int64_t faded = is_first ? fade_cycles(&self->fade_in.fade, &self->fade_in.limits) : 0;
+    const int64_t cycles = faded > planned ? faded : planned;
+    self->source = MOTION_PLANNED;
+    self->timed.is_stretched = asked > 0 && cycles > asked;
+    self->timed.stretched_count += self->timed.is_stretched;
+    self->timed.end_us = now_us + (uint64_t)cycles * self->platform.cycle_us;
+}
+
+static void plan_lone_step(motion_t *self)
+{
+    const plan_in_t in = {&self->platform, &self->followed, &self->targets, &self->intensity};
+    path_t *path = &self->plan.path;
+    if (!plan_step(&in, path)) {
+        self->source = MOTION_STREAMED; /* a lone sample: each axis by its own ramp */
+        return;
+    }
+    self->source = MOTION_PLANNED;
+    if (path->kind == PATH_STRAIGHT && fade_in_is_hidden(&self->fade_in, self->followed.phase)) {
+        scurve_end(&path->way.straight.curve); /* fading is the move */
     }
 }
 
@@ -342,110 +277,27 @@ static void prepare_plan(motion_t *self, motion_due_t due, bool is_first)
 static void plan_what_is_due(motion_t *self, uint64_t now_us)
 {
     const motion_due_t due = self->due;
-    const bool is_first = self->is_taking_over && !self->is_fading;
-    if ((due == DUE_TIMED || due == DUE_STEP) && fade_in_is_led_beyond(self)) {
+    const bool is_first = self->followed.phase == FOLLOW_AWAITED;
+    if ((due == DUE_TIMED || due == DUE_STEP) && fade_in_is_beyond_limits(&self->platform, &self->followed)) {
         fade_in_again(self);
         return;
     }
     self->due = DUE_NOTHING;
-    if (due != DUE_NOTHING) {
-        prepare_plan(self, due, is_first);
+    if (due == DUE_NOTHING) {
+        return;
     }
-    if (due == DUE_TIMED) {
-        plan_timed(self, self->asked_cycles, is_first, now_us);
-    } else if (due == DUE_STEP && (is_first || !is_on_the_way(self))) {
-        plan_step(self);
-    } else if (due == DUE_STREAM) {
+    prepare_plan(self, due, is_first);
+    if (due == DUE_STREAM) {
         self->source = MOTION_STREAMED;
-    }
-}
-
-void follow_begin(motion_t *self, uint64_t now_us)
-{
-    self->is_taking_over = true;
-    self->is_fading = false;
-    if (self->has_pending) {
-        self->has_pending = false;
-        follow_target(self, &self->pending, now_us);
-    }
-}
-
-/* A stop, and the straight move that begins during it. */
-static void step_stop_and_straight(motion_t *self, ramp_ref_t ref[AXES_MAX])
-{
-    motion_straight_t *way = &self->plan.straight;
-    const bool was_done = sync_stop_is_done(&self->halt) && scurve_is_done(&way->path);
-    sync_stop_step(&self->halt, ref);
-    if (self->halt.elapsed > self->straight_after) {
-        scurve_step(&way->path);
-    }
-    for (unsigned i = 0; i < self->planned_slots; i++) {
-        const ramp_ref_t rest = {.pos_q32 = way->to_q32[i]};
-        const q32_t gone_q32 = scurve_between(&way->path, way->from_q32[i], way->to_q32[i]) - way->from_q32[i];
-        ref[i] = was_done ? rest : history_advance(&way->history[i], ref[i].pos_q32 + gone_q32);
-    }
-}
-
-/* The references of the slots along a plan. */
-static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
-{
-    if (self->source == MOTION_TIMED) {
-        quintic_step(&self->plan.quintic, ref);
-    } else if (self->source == MOTION_HALTING) {
-        step_stop_and_straight(self, ref);
-    } else {
-        motion_straight_t *way = &self->plan.straight;
-        const bool was_done = scurve_is_done(&way->path);
-        scurve_step(&way->path);
-        for (unsigned i = 0; i < AXES_MAX; i++) {
-            const ramp_ref_t rest = {.pos_q32 = way->to_q32[i]};
-            const q32_t pos_q32 = scurve_between(&way->path, way->from_q32[i], way->to_q32[i]);
-            ref[i] = was_done ? rest : history_advance(&way->history[i], pos_q32);
+    } else if (due == DUE_TIMED || is_first || !is_on_the_way(self)) {
+        const axis_scale_t scale = scale_of(self);
+        axis_targets_plan(&self->targets, &scale);
+        if (due == DUE_TIMED) {
+            plan_move(self, is_first, now_us);
+        } else {
+            plan_lone_step(self);
         }
     }
-    for (unsigned i = self->planned_slots; i < AXES_MAX; i++) {
-        ref[i] = (ramp_ref_t){.pos_q32 = self->slot_q32[i]};
-    }
-    axis_targets_shift_refs(self, ref);
-}
-
-/* Pose axes through their ramps, into the workspace, to cylinders. */
-static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
-{
-    const ramp_bandwidth_t bandwidth = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
-    coordinated_step_t to;
-    const unsigned flags = coordinated_step(self, ref, bandwidth, &to);
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        out->asked.axis_q32[i] = ref[i].pos_q32;
-    }
-    out->sent = to.pose;
-    out->limiting_cylinder = to.limiting_cylinder != 0 ? (uint8_t)to.limiting_cylinder : self->limiting_cylinder;
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        ref[i] = history_advance(&self->reference[i], to.extension_mm_q32[i]);
-    }
-    out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |
-                  ((flags & RAMP_ACCEL) ? MOTION_ACCEL : 0) | (to.limiting_cylinder != 0 ? MOTION_CLAMPED : 0);
-}
-
-/* From the slots' references to the cylinders'. */
-static void step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
-{
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        self->led[i] = (history_t){ref[i].pos_q32, ref[i].vel_per_cycle_q32, ref[i].acc_per_cycle2_q32};
-    }
-    fade_in_step(self, ref, out);
-    if (self->space == MOTION_POSE) {
-        step_pose(self, ref, out);
-    } else {
-        out->flags |= MOTION_IN_CYLINDERS;
-    }
-}
-
-/* A step in progress at a speed limit. */
-static bool is_step_cruising(const motion_t *self)
-{
-    const scurve_t *path = &self->plan.straight.path;
-    return self->source == MOTION_STRAIGHT && self->planned_slots == POSE_AXES && path->acc == 0 && path->vel != 0;
 }
 
 void follow_plan(motion_t *self, uint64_t now_us)
@@ -457,25 +309,74 @@ void follow_plan(motion_t *self, uint64_t now_us)
 /* A stream's references. */
 static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
+    const axis_scale_t scale = scale_of(self);
     stream_set_scale(&self->stream, intensity_largest_q16(&self->intensity));
     (void)stream_step(&self->stream, now_us, kin_followed(self), ref);
-    jump_step(self, ref);
-    axis_targets_scale_refs(self, ref);
-    out->flags |= (self->stream.curve.governor.strength_q32 >= 2 * Q32_ONE ? MOTION_ACCEL : 0) |
-                  (self->stream.curve.governor.is_slowed ? MOTION_SPEED : 0);
+    self->is_jumping = self->is_jumping && jump_step(&self->plan.jump, ref);
+    axis_targets_scale_refs(&scale, ref);
+    out->flags |= (stream_is_smoothed(&self->stream) ? MOTION_ACCEL : 0) | (stream_is_slowed(&self->stream) ? MOTION_SPEED : 0);
+}
+
+/* The references of a planned path. Axes that do not follow it go to their targets by themselves. */
+static void step_planned(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
+{
+    path_t *path = &self->plan.path;
+    self->is_jumping = false;
+    path_step(path, ref);
+    for (unsigned i = path->axes; i < AXES_MAX; i++) {
+        ref[i] = (ramp_ref_t){.pos_q32 = self->targets.value_q32[i]};
+    }
+    axis_targets_shift_refs(&self->targets, &self->intensity, ref);
+    out->flags |= path_is_cruising(path) && path->axes == POSE_AXES ? MOTION_SPEED : 0;
+}
+
+/* Pose axes through their ramps, into the workspace, to cylinders. */
+static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
+{
+    const ramp_bandwidth_t bandwidth = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
+    coordinated_step_t to;
+    const unsigned flags = coordinated_step(&self->platform, ref, bandwidth, &to);
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        out->asked.axis_q32[i] = ref[i].pos_q32;
+    }
+    out->sent = to.pose;
+    out->limiting_cylinder = to.limiting_cylinder != 0 ? (uint8_t)to.limiting_cylinder : self->targets.limiting_cylinder;
+    for (unsigned i = 0; i < self->platform.cylinders; i++) {
+        ref[i] = history_advance(&self->platform.reference[i], to.extension_mm_q32[i]);
+    }
+    out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |
+                  ((flags & RAMP_ACCEL) ? MOTION_ACCEL : 0) | (to.limiting_cylinder != 0 ? MOTION_CLAMPED : 0);
+}
+
+/* From the references of the followed axes to those of the cylinders. */
+static void step_axes(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
+{
+    followed_t *followed = &self->followed;
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        followed->past[i] = (history_t){ref[i].pos_q32, ref[i].vel_per_cycle_q32, ref[i].acc_per_cycle2_q32};
+    }
+    if (followed->phase == FOLLOW_FADING_IN) {
+        const bool is_fading = fade_in_step(&self->fade_in, &self->platform, followed->space, ref);
+        followed->phase = is_fading ? FOLLOW_FADING_IN : FOLLOW_FULLY;
+        out->flags |= MOTION_TAKEOVER;
+    }
+    if (followed->space == MOTION_POSE) {
+        step_pose(self, ref, out);
+    } else {
+        out->flags |= MOTION_IN_CYLINDERS;
+    }
 }
 
 void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], motion_output_t *out)
 {
-    out->flags |= self->is_stretched ? MOTION_STRETCHED : 0;
+    ramp_t *angle = &self->platform.axis[AXIS_ANGLE];
+    out->flags |= self->timed.is_stretched ? MOTION_STRETCHED : 0;
     if (self->source == MOTION_STREAMED) {
         step_stream(self, now_us, cylinder_ref, out);
     } else {
-        self->is_jumping = false;
-        step_source(self, cylinder_ref);
-        out->flags |= is_step_cruising(self) ? MOTION_SPEED : 0;
+        step_planned(self, cylinder_ref, out);
     }
-    step_slots(self, cylinder_ref, out);
-    out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &cylinder_ref[AXIS_ANGLE], RAMP_FIRM);
-    out->flags |= self->is_clamped ? MOTION_CLAMPED : 0;
+    step_axes(self, cylinder_ref, out);
+    out->angle_deg_q32 = ramp_step(angle, &cylinder_ref[AXIS_ANGLE], RAMP_FIRM);
+    out->flags |= self->targets.is_clamped ? MOTION_CLAMPED : 0;
 }

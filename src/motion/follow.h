@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * follow.h - following a sender: poses or extensions, streamed or timed, and the take-over of its first pose. Private to
+ * follow.h - following a sender: poses or extensions, streamed or timed, and the fade-in from its first target on. Private to
  * src/motion.
  */
 #ifndef FOLLOW_H
@@ -7,17 +7,13 @@
 
 #include "heave/motion.h"
 
-/** Limits that a stream has on an axis of the space that is followed in [0, AXES_MAX), and on a cylinder [0, CYLINDERS_MAX). */
-governor_limits_t follow_axis_limits(const motion_t *self, unsigned i);
-governor_limits_t follow_cylinder_limits(const motion_t *self, unsigned i);
-
 /** True while a sender's target moves the platform. */
 bool follow_is_moving(const motion_t *self);
 
-/** At rest and ready to follow: takes the target that came meanwhile. */
+/** At rest and ready to follow: accepts the target that came meanwhile. */
 void follow_begin(motion_t *self, uint64_t now_us);
 
-/** Takes a target, at rest or in motion. Planned is in the next cycle, for the newest one. */
+/** Accepts a target, at rest or in motion. The path is planned in the next cycle, for the newest target. */
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us);
 
 /** Plans what the targets of this cycle ask for, while moving; may find that the platform has to stop first. */

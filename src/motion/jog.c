@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * jog.c - motion led by hand; see heave/jog.h.
+ * jog.c - manual motion; see heave/jog.h.
  * A jog is an S-curve to the end of its way that is stopped where the hand lets go: the same path and the same stop as everywhere
- * else, with limits of its own. Its limiter has the last word, so that no cylinder is ever faster, whatever leads it.
+ * else, with limits of its own. Its limiter comes last, so that no cylinder is ever faster, whatever its reference.
  */
 #include "jog.h"
 
@@ -11,73 +11,63 @@
 #define REACH_PIECES 64
 #define REACH_HALVES 16
 
-ramp_t *jog_own_ramp(motion_t *self, unsigned axis)
+hv_status_t jog_init(jog_t *self, const settings_t *settings)
 {
-    return axis == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[axis];
-}
-
-static bool is_led(const motion_t *self, unsigned axis)
-{
-    return (self->jog.led >> axis & 1u) != 0;
-}
-
-/* --- Begin and end --- */
-
-void motion_serve(motion_t *self)
-{
-    self->jog.is_serving = true;
-    self->jog.is_posed = false;
-    self->jog.led = 0;
-}
-
-void motion_place_axis(motion_t *self, unsigned axis, q32_t position_q32)
-{
-    ramp_t *ramp = jog_own_ramp(self, axis);
-    self->is_pose_stale = self->is_pose_stale || ramp->state.pos_q32 != position_q32;
-    ramp->state = (ramp_state_t){.pos_q32 = position_q32};
-    self->jog.led &= ~(1u << axis);
-    self->plan.straight.to_q32[axis] = position_q32;
-    if (axis == AXIS_ANGLE) {
-        self->angle_target_deg_q32 = position_q32;
-    } else {
-        self->reference[axis] = ramp->state;
+    jog_limits_t *limits = &self->limits;
+    *limits = (jog_limits_t){.deg_per_cycle_q32 = 0};
+    if (settings->jog_mm_s_q16 == 0) {
+        return HV_OK; /* no limiter can be made of it: nothing is moved */
     }
+    const q16_t own_q16 = settings->cylinder_speed_mm_s_q16;
+    const q16_t speed_q16 = settings->jog_mm_s_q16 < own_q16 ? settings->jog_mm_s_q16 : own_q16;
+    limits->deg_per_cycle_q32 = fx_mul_div(q32_from_q16(settings->jog_deg_s_q16), settings->cycle_us, 1000000);
+    limits->signal_mm_q32 = q32_from_q16(settings->signal_mm_q16);
+    limits->signal_deg_q32 = q32_from_q16(settings->signal_deg_q16);
+    limits->signal_mm_per_cycle_q32 = fx_mul_div(q32_from_q16(settings->signal_mm_s_q16), settings->cycle_us, 1000000);
+    return ramp_limits_from_units(0, settings->stroke_mm_q16[0], speed_q16, settings->engage_accel_mm_s2_q16,
+                                  settings->cylinder_jerk_mm_s3, settings->cycle_us, &limits->cylinder);
+}
+
+const ramp_t *jog_limiter(const jog_t *self, const platform_t *platform, unsigned axis)
+{
+    const ramp_t *own = axis == AXIS_ANGLE ? &platform->axis[AXIS_ANGLE] : &platform->cylinder[axis];
+    return self->is_serving && jog_is_moved(self, axis) ? &self->ramp[axis] : own;
+}
+
+/* The axis of a reference: a cylinder, or the rotation motor. */
+static unsigned axis_of(unsigned i)
+{
+    return i < CYLINDERS_MAX ? i : AXIS_ANGLE;
 }
 
 /* As gentle as a jog, as fast as is asked for, and as wide as to where the axis is. */
-static hv_status_t shape_axis(motion_t *self, unsigned axis, q32_t vel_q32)
+static hv_status_t shape_axis(jog_t *self, const platform_t *platform, unsigned axis, q32_t vel_q32)
 {
-    const ramp_t *own = jog_own_ramp(self, axis);
-    ramp_limits_t limits = axis == AXIS_ANGLE ? own->limits : self->jog_limits.cylinder;
+    const ramp_t *own = platform_limiter(platform, axis);
+    ramp_limits_t limits = axis == AXIS_ANGLE ? own->limits : self->limits.cylinder;
     const q32_t here_q32 = own->state.pos_q32;
-    const q32_t most_q32 = axis == AXIS_ANGLE ? self->jog_limits.deg_per_cycle_q32 : limits.vel_per_cycle_q32;
+    const q32_t most_q32 = axis == AXIS_ANGLE ? self->limits.deg_per_cycle_q32 : limits.vel_per_cycle_q32;
     limits.vel_per_cycle_q32 = fx_clamp(vel_q32, 0, most_q32 < limits.vel_per_cycle_q32 ? most_q32 : limits.vel_per_cycle_q32);
     limits.pos_min_q32 = here_q32 < own->limits.pos_min_q32 ? here_q32 : own->limits.pos_min_q32;
     limits.pos_max_q32 = here_q32 > own->limits.pos_max_q32 ? here_q32 : own->limits.pos_max_q32;
-    return ramp_init(&self->jog.ramp[axis], &limits, here_q32);
+    return ramp_init(&self->ramp[axis], &limits, here_q32);
 }
 
-static q32_t vel_of(const motion_t *self, q16_t speed_q16)
+static q32_t vel_of(const platform_t *platform, q16_t speed_q16)
 {
-    return fx_mul_div(fx_abs(q32_from_q16(speed_q16)), self->cycle_us, 1000000);
+    return fx_mul_div(fx_abs(q32_from_q16(speed_q16)), platform->cycle_us, 1000000);
 }
 
-void jog_begin(motion_t *self, uint32_t led, bool is_posed, const path_limits_t *limits)
+void jog_plan(jog_t *self, const platform_t *platform, straight_t *line, uint32_t moved, bool is_posed,
+              const path_limits_t *limits)
 {
-    motion_straight_t *way = &self->plan.straight;
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        way->history[i] = jog_own_ramp(self, i < CYLINDERS_MAX ? i : AXIS_ANGLE)->state;
+        line->history[i] = platform_limiter(platform, axis_of(i))->state;
     }
-    scurve_plan(&way->path, limits, 1);
-    self->jog.led = led;
-    self->jog.is_posed = is_posed;
-    self->jog.is_excited = false;
-    self->source = MOTION_JOGGED;
-}
-
-bool jog_is_ready(const motion_t *self)
-{
-    return self->jog.is_serving && self->source == MOTION_RESTING && motion_is_at_rest(self);
+    scurve_plan(&line->curve, limits, 1);
+    self->moved = moved;
+    self->is_posed = is_posed;
+    self->is_excited = false;
 }
 
 /* The end of a jog: that of the axis, or before it. */
@@ -90,52 +80,50 @@ static q32_t end_of(q32_t here_q32, const ramp_limits_t *limits, q16_t speed_q16
                          : (least_q32 > limits->pos_min_q32 ? least_q32 : limits->pos_min_q32);
 }
 
-hv_status_t motion_jog_axis(motion_t *self, unsigned axis, q16_t speed_q16, q16_t way_q16)
+hv_status_t jog_begin_axis(jog_t *self, const platform_t *platform, straight_t *line, unsigned axis, q16_t speed_q16,
+                           q16_t way_q16)
 {
-    motion_straight_t *way = &self->plan.straight;
-    const ramp_t *own = jog_own_ramp(self, axis);
+    const ramp_t *own = platform_limiter(platform, axis);
     path_limits_t limits = path_limits_none();
-    if (!jog_is_ready(self)) {
-        return HV_ERR_STATE;
-    }
     const q32_t to_q32 = end_of(own->state.pos_q32, &own->limits, speed_q16, way_q16);
     const q32_t left_q32 = fx_sub_sat(to_q32, own->state.pos_q32);
     const bool is_there = speed_q16 > 0 ? left_q32 <= 0 : left_q32 >= 0;
-    const hv_status_t status = is_there ? HV_ERR_RANGE : shape_axis(self, axis, vel_of(self, speed_q16));
+    const hv_status_t status = is_there ? HV_ERR_RANGE : shape_axis(self, platform, axis, vel_of(platform, speed_q16));
     if (status != HV_OK) {
         return status;
     }
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        way->from_q32[i] = jog_own_ramp(self, i < CYLINDERS_MAX ? i : AXIS_ANGLE)->state.pos_q32;
-        way->to_q32[i] = way->from_q32[i];
+        line->from_q32[i] = platform_limiter(platform, axis_of(i))->state.pos_q32;
+        line->to_q32[i] = line->from_q32[i];
     }
-    way->to_q32[axis] = to_q32;
-    path_limits_narrow(&limits, left_q32, &self->jog.ramp[axis].limits);
-    jog_begin(self, 1u << axis, false, &limits);
+    line->to_q32[axis] = to_q32;
+    path_limits_narrow(&limits, left_q32, &self->ramp[axis].limits);
+    jog_plan(self, platform, line, 1u << axis, false, &limits);
     return HV_OK;
 }
 
 /* --- Poses --- */
 
 /* The pose between two, with what the mechanism imposes. */
-static pose_t between(const motion_t *self, const q32_t *from_q32, const q32_t *to_q32, int64_t part, int64_t whole)
+static pose_t between(const platform_t *platform, const q32_t *from_q32, const q32_t *to_q32, int64_t part, int64_t whole)
 {
     pose_t pose;
     for (unsigned i = 0; i < POSE_AXES; i++) {
         pose.axis_q32[i] = from_q32[i] + fx_mul_div(to_q32[i] - from_q32[i], part, whole);
     }
-    kin_constrain(&self->kin, &pose);
+    kin_constrain(&platform->kin, &pose);
     return pose;
 }
 
-bool jog_is_reached(const motion_t *self, const pose_t *pose)
+bool jog_is_reached(const platform_t *platform, const pose_t *pose)
 {
     q32_t extension_mm_q32[CYLINDERS_MAX];
-    if (kin_inverse(&self->kin, pose, extension_mm_q32) != HV_OK || !kin_has_margin(&self->kin, pose, KIN_MARGIN_LEAST_Q32)) {
+    if (kin_inverse(&platform->kin, pose, extension_mm_q32) != HV_OK ||
+        !kin_has_margin(&platform->kin, pose, KIN_MARGIN_LEAST_Q32)) {
         return false;
     }
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        const ramp_t *own = &self->cylinder[i];
+    for (unsigned i = 0; i < platform->cylinders; i++) {
+        const ramp_t *own = &platform->cylinder[i];
         const q32_t least_q32 = own->state.pos_q32 < own->limits.pos_min_q32 ? own->state.pos_q32 : own->limits.pos_min_q32;
         const q32_t most_q32 = own->state.pos_q32 > own->limits.pos_max_q32 ? own->state.pos_q32 : own->limits.pos_max_q32;
         if (extension_mm_q32[i] < least_q32 || extension_mm_q32[i] > most_q32) {
@@ -147,175 +135,137 @@ bool jog_is_reached(const motion_t *self, const pose_t *pose)
 
 /* Takes the end of the way back to where everything before it is in reach.
  * Returns false where nothing is. */
-static bool shorten(const motion_t *self, const q32_t *from_q32, q32_t *to_q32, unsigned axis)
+static bool shorten(const platform_t *platform, const q32_t *from_q32, q32_t *to_q32, unsigned axis)
 {
     const int64_t whole = (int64_t)REACH_PIECES << REACH_HALVES;
     int64_t good = 0;
     int64_t step = (int64_t)1 << REACH_HALVES;
     while (good < whole) {
-        const pose_t pose = between(self, from_q32, to_q32, good + step, whole);
-        if (!jog_is_reached(self, &pose)) {
+        const pose_t pose = between(platform, from_q32, to_q32, good + step, whole);
+        if (!jog_is_reached(platform, &pose)) {
             break;
         }
         good += step;
     }
     for (step /= 2; good < whole && step > 0; step /= 2) {
-        const pose_t pose = between(self, from_q32, to_q32, good + step, whole);
-        good += jog_is_reached(self, &pose) ? step : 0;
+        const pose_t pose = between(platform, from_q32, to_q32, good + step, whole);
+        good += jog_is_reached(platform, &pose) ? step : 0;
     }
     const q32_t left_q32 = fx_mul_div(to_q32[axis] - from_q32[axis], good, whole);
     to_q32[axis] = from_q32[axis] + left_q32;
     return left_q32 != 0;
 }
 
-bool jog_find_here(const motion_t *self, q32_t from_q32[POSE_AXES])
-{
-    q32_t extension_mm_q32[CYLINDERS_MAX];
-    pose_t pose;
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        extension_mm_q32[i] = self->cylinder[i].state.pos_q32;
-    }
-    if (kin_forward(&self->kin, extension_mm_q32, &self->pose, &pose, NULL) != HV_OK) {
-        return false;
-    }
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        from_q32[i] = pose.axis_q32[i];
-    }
-    return true;
-}
-
-static hv_status_t shape_all(motion_t *self)
+static hv_status_t shape_all(jog_t *self, const platform_t *platform)
 {
     hv_status_t status = HV_OK;
-    for (unsigned i = 0; i < self->cylinders && status == HV_OK; i++) {
-        status = shape_axis(self, i, self->jog_limits.cylinder.vel_per_cycle_q32);
+    for (unsigned i = 0; i < platform->cylinders && status == HV_OK; i++) {
+        status = shape_axis(self, platform, i, self->limits.cylinder.vel_per_cycle_q32);
     }
     return status;
 }
 
-hv_status_t motion_jog_pose(motion_t *self, unsigned axis, q16_t speed_q16, q16_t way_q16)
+hv_status_t jog_begin_pose(jog_t *self, const platform_t *platform, straight_t *line, unsigned axis, q16_t speed_q16,
+                           q16_t way_q16)
 {
-    motion_straight_t *way = &self->plan.straight;
     path_limits_t limits = path_limits_none();
-    ramp_limits_t asked = self->axis[axis].limits;
-    q32_t from_q32[POSE_AXES];
+    ramp_limits_t asked = platform->axis[axis].limits;
+    pose_t here;
     q32_t to_q32[POSE_AXES];
-    if (!jog_is_ready(self)) {
-        return HV_ERR_STATE;
-    }
-    if (!self->is_axis_moved[axis]) {
+    if (!platform->is_axis_moved[axis]) {
         return HV_ERR_NOSUP;
     }
-    if (!jog_find_here(self, from_q32)) {
+    if (!platform_find_pose(platform, &here)) {
         return HV_ERR_ARG;
     }
+    const q32_t *from_q32 = here.axis_q32;
     for (unsigned i = 0; i < POSE_AXES; i++) {
         to_q32[i] = from_q32[i];
     }
     to_q32[axis] = end_of(from_q32[axis], &asked, speed_q16, way_q16);
     const bool is_there = speed_q16 > 0 ? to_q32[axis] <= from_q32[axis] : to_q32[axis] >= from_q32[axis];
     const bool is_rotation = axis < AXIS_X;
-    const q32_t most_q32 = is_rotation ? self->jog_limits.deg_per_cycle_q32 : self->jog_limits.cylinder.vel_per_cycle_q32;
-    const q32_t vel_q32 = fx_clamp(vel_of(self, speed_q16), 0, most_q32);
+    const q32_t most_q32 = is_rotation ? self->limits.deg_per_cycle_q32 : self->limits.cylinder.vel_per_cycle_q32;
+    const q32_t vel_q32 = fx_clamp(vel_of(platform, speed_q16), 0, most_q32);
     asked.vel_per_cycle_q32 = vel_q32 < asked.vel_per_cycle_q32 ? vel_q32 : asked.vel_per_cycle_q32;
-    if (is_there || asked.vel_per_cycle_q32 <= 0 || !shorten(self, from_q32, to_q32, axis) || shape_all(self) != HV_OK) {
+    if (is_there || asked.vel_per_cycle_q32 <= 0 || !shorten(platform, from_q32, to_q32, axis) ||
+        shape_all(self, platform) != HV_OK) {
         return HV_ERR_RANGE;
     }
-    self->jog.led = (1u << self->cylinders) - 1u; /* their limits are those of the way */
     path_limits_narrow(&limits, to_q32[axis] - from_q32[axis], &asked);
-    path_check_narrow(self, from_q32, to_q32, &limits);
+    path_check_narrow(platform, self->ramp, from_q32, to_q32, &limits);
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        way->from_q32[i] = from_q32[i];
-        way->to_q32[i] = to_q32[i];
+        line->from_q32[i] = from_q32[i];
+        line->to_q32[i] = to_q32[i];
     }
-    way->from_q32[AXIS_ANGLE] = way->to_q32[AXIS_ANGLE] = self->axis[AXIS_ANGLE].state.pos_q32;
-    jog_begin(self, (1u << self->cylinders) - 1u, true, &limits);
+    line->from_q32[AXIS_ANGLE] = line->to_q32[AXIS_ANGLE] = platform->axis[AXIS_ANGLE].state.pos_q32;
+    jog_plan(self, platform, line, (1u << platform->cylinders) - 1u, true, &limits);
     return HV_OK;
 }
 
 /* --- The cycle --- */
 
-/* On the way of a jog, or of a test signal, whose way ends at its amplitude. */
-static q32_t at_share(const motion_t *self, unsigned axis, q62_t share_q62)
+/* On the line of a jog, or of a test signal, which ends at its amplitude. */
+static q32_t at_share(const jog_t *self, const straight_t *line, unsigned axis, q62_t share_q62)
 {
-    const motion_straight_t *way = &self->plan.straight;
-    const q32_t from_q32 = way->from_q32[axis];
-    return self->jog.is_excited ? from_q32 + fx_mul_shift(way->to_q32[axis] - from_q32, share_q62, 62)
-                                : scurve_between(&way->path, from_q32, way->to_q32[axis]);
+    const q32_t from_q32 = line->from_q32[axis];
+    return self->is_excited ? from_q32 + fx_mul_shift(line->to_q32[axis] - from_q32, share_q62, 62)
+                            : scurve_between(&line->curve, from_q32, line->to_q32[axis]);
 }
 
-HV_OWN_FRAME static void refer_to_pose(motion_t *self, q62_t share_q62, ramp_ref_t ref[AXES_MAX])
+HV_OWN_FRAME static void refer_to_pose(const jog_t *self, const platform_t *platform, straight_t *line, q62_t share_q62,
+                                       ramp_ref_t ref[AXES_MAX])
 {
-    motion_straight_t *way = &self->plan.straight;
     q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
     pose_t pose;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        pose.axis_q32[i] = at_share(self, i, share_q62);
+        pose.axis_q32[i] = at_share(self, line, i, share_q62);
     }
-    kin_constrain(&self->kin, &pose);
-    const bool is_solved = kin_inverse(&self->kin, &pose, extension_mm_q32) == HV_OK;
-    for (unsigned i = 0; i < self->cylinders; i++) { /* the way was looked at before: there is no such pose on it */
-        ref[i] = history_advance(&way->history[i], is_solved ? extension_mm_q32[i] : way->history[i].pos_q32);
+    kin_constrain(&platform->kin, &pose);
+    const bool is_solved = kin_inverse(&platform->kin, &pose, extension_mm_q32) == HV_OK;
+    for (unsigned i = 0; i < platform->cylinders; i++) { /* the line was looked at before: there is no such pose on it */
+        ref[i] = history_advance(&line->history[i], is_solved ? extension_mm_q32[i] : line->history[i].pos_q32);
     }
-    ref[AXIS_ANGLE] = (ramp_ref_t){.pos_q32 = way->from_q32[AXIS_ANGLE]};
+    ref[AXIS_ANGLE] = (ramp_ref_t){.pos_q32 = line->from_q32[AXIS_ANGLE]};
 }
 
-void jog_refer(motion_t *self, ramp_ref_t ref[AXES_MAX])
+void jog_step(jog_t *self, const platform_t *platform, straight_t *line, ramp_ref_t ref[AXES_MAX])
 {
-    motion_straight_t *way = &self->plan.straight;
-    const q62_t share_q62 = self->jog.is_excited ? excitation_step(&self->jog.signal) : 0;
-    scurve_step(&way->path);
-    if (self->jog.is_posed) {
-        refer_to_pose(self, share_q62, ref);
+    const q62_t share_q62 = self->is_excited ? excitation_step(&self->signal) : 0;
+    scurve_step(&line->curve);
+    if (self->is_posed) {
+        refer_to_pose(self, platform, line, share_q62, ref);
         return;
     }
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        ref[i] = history_advance(&way->history[i], at_share(self, i, share_q62));
+        ref[i] = history_advance(&line->history[i], at_share(self, line, i, share_q62));
     }
 }
 
-/* An axis that is not led stays as it is; one that has come to rest after its stop is led no more. */
-static unsigned limit_axis(motion_t *self, unsigned axis, const ramp_ref_t *ref)
+unsigned jog_limit(jog_t *self, platform_t *platform, unsigned axis, const ramp_ref_t *ref, bool is_ended)
 {
-    ramp_t *own = jog_own_ramp(self, axis);
-    ramp_t *ramp = &self->jog.ramp[axis];
-    if (!is_led(self, axis)) {
+    ramp_t *own = axis == AXIS_ANGLE ? &platform->axis[AXIS_ANGLE] : &platform->cylinder[axis];
+    ramp_t *ramp = &self->ramp[axis];
+    if (!jog_is_moved(self, axis)) {
         return 0;
     }
     (void)ramp_step(ramp, ref, RAMP_FIRM);
     own->state = ramp->state;
-    if (self->source == MOTION_RESTING && ramp_is_at_rest(ramp)) {
-        self->jog.led &= ~(1u << axis);
+    if (is_ended && ramp_is_at_rest(ramp)) {
+        self->moved &= ~(1u << axis);
     }
     return ramp->flags;
 }
 
-unsigned jog_limit(motion_t *self, const ramp_ref_t ref[AXES_MAX], q32_t extension_mm_q32[CYLINDERS_MAX])
-{
-    unsigned flags = 0;
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        flags |= limit_axis(self, i, &ref[i]);
-        extension_mm_q32[i] = self->cylinder[i].state.pos_q32;
-    }
-    return flags;
-}
-
-q32_t jog_limit_angle(motion_t *self, const ramp_ref_t *ref)
-{
-    (void)limit_axis(self, AXIS_ANGLE, ref);
-    return self->axis[AXIS_ANGLE].state.pos_q32;
-}
-
 /* Where no pose is known, as before homing, there is nothing to go by. */
-bool jog_is_beyond_stroke(const motion_t *self)
+bool jog_is_near_singularity(const jog_t *self, const platform_t *platform)
 {
     const uint32_t cylinders = (1u << CYLINDERS_MAX) - 1u;
-    return self->source == MOTION_JOGGED && !self->jog.is_posed && (self->jog.led & cylinders) != 0 && !self->is_pose_stale &&
-           !motion_is_at_rest(self) && !assembly_can_stop(self);
+    return !self->is_posed && (self->moved & cylinders) != 0 && !platform->is_pose_stale && !platform_is_at_rest(platform) &&
+           !assembly_can_stop(platform);
 }
 
-bool jog_is_done(const motion_t *self)
+bool jog_is_done(const jog_t *self, const straight_t *line)
 {
-    const bool is_made = self->jog.is_excited ? excitation_is_done(&self->jog.signal) : scurve_is_done(&self->plan.straight.path);
-    return self->source == MOTION_JOGGED && is_made && motion_is_at_rest(self);
+    return self->is_excited ? excitation_is_done(&self->signal) : scurve_is_done(&line->curve);
 }

@@ -6,14 +6,24 @@
 #ifndef JUMP_H
 #define JUMP_H
 
-#include "heave/motion.h"
+#include "axis_targets.h"
 
-/** Takes the jump to the newest slots out of the stream. Without effect where it is not far larger than the steps around it: the
- * stream makes these.
- *  @param step_q32 how far the sender has gone since the sample that jumped first */
-void jump_accept(motion_t *self, const q32_t step_q32[POSE_AXES]);
+/** The sample that comes next, of a stream that has jumped. */
+typedef struct {
+    const axis_scale_t *scale;
+    const followed_t *followed;
+    const q32_t *value_q32; /**< the sample as values of the axes (axis_targets.h) */
+    const q32_t *step_q32;  /**< of POSE_AXES: how far the sender has gone since the sample that jumped first */
+} jump_in_t;
 
-/** One cycle: adds the offset to a stream's references. */
-void jump_step(motion_t *self, ramp_ref_t ref[AXES_MAX]);
+/** Takes the jump to the sample out of the stream. Without effect where it is not far larger than the steps around it: the stream
+ *  makes these.
+ *  @param is_jumping an earlier jump is not yet made up
+ *  @return true while jump_step() has to be called */
+bool jump_accept(jump_t *self, bool is_jumping, const jump_in_t *in, stream_t *stream);
+
+/** One cycle: adds the offset to a stream's references.
+ *  @return false when it is made up */
+bool jump_step(jump_t *self, ramp_ref_t ref[AXES_MAX]);
 
 #endif

@@ -5,8 +5,7 @@
  */
 #include "path_check.h"
 
-#include "jog_limits.h"
-#include "active_axis.h"
+#include "followed.h"
 
 #define QUINTIC_SHIFT   5 /* a division for each limit of each piece took a sixth of the time of a plan */
 #define QUINTIC_PIECES  (1 << QUINTIC_SHIFT)
@@ -48,7 +47,7 @@ static bool is_within(const differences_t *d, q32_t third_q32, const ramp_limits
            fx_abs(third_q32) <= limit_per_piece(limits->jerk_per_cycle3_q32, cycles, 3);
 }
 
-bool path_check_is_feasible(const motion_t *motion, const quintic_t *quintic)
+bool path_check_is_feasible(const platform_t *platform, const quintic_t *quintic)
 {
     differences_t d[CYLINDERS_MAX] = {{0}};
     for (int64_t piece = 0; piece <= QUINTIC_PIECES; piece++) {
@@ -57,12 +56,12 @@ bool path_check_is_feasible(const motion_t *motion, const quintic_t *quintic)
         for (unsigned i = 0; i < POSE_AXES; i++) {
             pose.axis_q32[i] = quintic_position(quintic, i, piece * (Q62_ONE / QUINTIC_PIECES));
         }
-        if (kin_inverse(&motion->kin, &pose, extension_mm_q32) != HV_OK) {
+        if (kin_inverse(&platform->kin, &pose, extension_mm_q32) != HV_OK) {
             return false;
         }
-        for (unsigned i = 0; i < motion->cylinders; i++) {
+        for (unsigned i = 0; i < platform->cylinders; i++) {
             const q32_t third_q32 = add_sample(&d[i], piece, extension_mm_q32[i]);
-            if (!is_within(&d[i], third_q32, &motion->cylinder[i].limits, quintic->cycles)) {
+            if (!is_within(&d[i], third_q32, &platform->cylinder[i].limits, quintic->cycles)) {
                 return false;
             }
         }
@@ -97,7 +96,8 @@ static ramp_limits_t less_bend(const ramp_limits_t *own, q32_t bend_q32, const p
     return left;
 }
 
-void path_check_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits)
+void path_check_narrow(const platform_t *platform, const ramp_t *limiter, const q32_t *from_q32, const q32_t *to_q32,
+                       path_limits_t *limits)
 {
     differences_t d[CYLINDERS_MAX] = {{0}};
     q32_t slope_q32[CYLINDERS_MAX] = {0};
@@ -108,39 +108,39 @@ void path_check_narrow(const motion_t *motion, const q32_t *from_q32, const q32_
         for (unsigned i = 0; i < POSE_AXES; i++) {
             pose.axis_q32[i] = from_q32[i] + fx_mul_div(to_q32[i] - from_q32[i], piece, STRAIGHT_PIECES);
         }
-        if (kin_inverse(&motion->kin, &pose, extension_mm_q32) != HV_OK) {
+        if (kin_inverse(&platform->kin, &pose, extension_mm_q32) != HV_OK) {
             return;
         }
-        for (unsigned i = 0; i < motion->cylinders; i++) {
+        for (unsigned i = 0; i < platform->cylinders; i++) {
             (void)add_sample(&d[i], piece, extension_mm_q32[i]);
             slope_q32[i] = fx_abs(d[i].first_q32) > slope_q32[i] ? fx_abs(d[i].first_q32) : slope_q32[i];
             bend_q32[i] = fx_abs(d[i].second_q32) > bend_q32[i] ? fx_abs(d[i].second_q32) : bend_q32[i];
         }
     }
-    for (unsigned i = 0; i < motion->cylinders; i++) {
-        const ramp_limits_t *own = &jog_limiter(motion, i)->limits;
+    for (unsigned i = 0; i < platform->cylinders; i++) {
+        const ramp_limits_t *own = &limiter[i].limits;
         slope_q32[i] *= STRAIGHT_PIECES;
         bend_q32[i] *= STRAIGHT_PIECES * STRAIGHT_PIECES;
         narrow_by_speed(limits, slope_q32[i], own->vel_per_cycle_q32);
         narrow_by_bend(limits, bend_q32[i], own->acc_per_cycle2_q32);
     }
-    for (unsigned i = 0; i < motion->cylinders; i++) {
-        const ramp_limits_t left = less_bend(&jog_limiter(motion, i)->limits, bend_q32[i], limits);
+    for (unsigned i = 0; i < platform->cylinders; i++) {
+        const ramp_limits_t left = less_bend(&limiter[i].limits, bend_q32[i], limits);
         path_limits_narrow(limits, slope_q32[i], &left);
     }
 }
 
-/* The positions of the slots n cycles later: those of the stop, by the trapezoidal rule, and what the straight way adds. */
-static void advance_blend(const motion_t *motion, unsigned slots, int64_t cycle, int64_t n, q32_t *vel_q32, q32_t *halted_q32)
+/* The positions of a stop n cycles later, by the trapezoidal rule. */
+static void advance_stop(const sync_stop_t *stop, int64_t cycle, int64_t n, q32_t *vel_q32, q32_t *pos_q32)
 {
-    for (unsigned i = 0; i < slots; i++) {
-        const q32_t next_q32 = sync_stop_velocity(&motion->halt, i, cycle);
-        halted_q32[i] += (vel_q32[i] + next_q32) * n / 2;
+    for (unsigned i = 0; i < stop->axes; i++) {
+        const q32_t next_q32 = sync_stop_velocity(stop, i, cycle);
+        pos_q32[i] += (vel_q32[i] + next_q32) * n / 2;
         vel_q32[i] = next_q32;
     }
 }
 
-/* A sample of all slots: whether each is within. */
+/* A sample of several axes: whether each is within. */
 static bool are_within(differences_t *d, int64_t sample, const q32_t *pos_q32, unsigned count, const ramp_limits_t *const *limits,
                        int64_t n)
 {
@@ -154,47 +154,49 @@ static bool are_within(differences_t *d, int64_t sample, const q32_t *pos_q32, u
     return are;
 }
 
-HV_OWN_FRAME bool path_check_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after)
+HV_OWN_FRAME bool path_check_blend_is_feasible(const platform_t *platform, const followed_t *followed, const path_t *path,
+                                               int64_t after)
 {
-    const motion_straight_t *way = &motion->plan.straight;
-    const int64_t n = 1 + motion->halt.cycles / BLEND_PIECES;
-    scurve_t path = way->path;
-    differences_t slot[AXES_MAX] = {{0}};
+    const straight_t *line = &path->way.straight;
+    const sync_stop_t *stop = &path->stop;
+    const int64_t n = 1 + stop->cycles / BLEND_PIECES;
+    scurve_t curve = line->curve;
+    differences_t axis[AXES_MAX] = {{0}};
     differences_t cylinder[CYLINDERS_MAX] = {{0}};
-    const ramp_limits_t *slot_list[AXES_MAX];
+    const ramp_limits_t *axis_list[AXES_MAX];
     const ramp_limits_t *cylinder_list[CYLINDERS_MAX];
     q32_t vel_q32[AXES_MAX];
-    q32_t halted_q32[AXES_MAX];
-    for (unsigned i = 0; i < slots; i++) {
-        slot_list[i] = active_axis_limits(motion, i);
-        vel_q32[i] = motion->halt.start[i].vel_per_cycle_q32;
-        halted_q32[i] = motion->halt.start[i].pos_q32;
+    q32_t stopped_q32[AXES_MAX];
+    for (unsigned i = 0; i < path->axes; i++) {
+        axis_list[i] = followed_limits(followed, platform, i);
+        vel_q32[i] = stop->start[i].vel_per_cycle_q32;
+        stopped_q32[i] = stop->start[i].pos_q32;
     }
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        cylinder_list[i] = &motion->cylinder[i].limits;
+        cylinder_list[i] = &platform->cylinder[i].limits;
     }
-    for (int64_t cycle = n, sample = 0; cycle <= motion->halt.cycles + n; cycle += n, sample++) {
+    for (int64_t cycle = n, sample = 0; cycle <= stop->cycles + n; cycle += n, sample++) {
         q32_t pos_q32[AXES_MAX] = {0};
         q32_t extension_mm_q32[CYLINDERS_MAX];
         pose_t pose = {{0}};
-        advance_blend(motion, slots, cycle, n, vel_q32, halted_q32);
+        advance_stop(stop, cycle, n, vel_q32, stopped_q32);
         for (int64_t k = cycle - n; k < cycle; k++) {
             if (k >= after) {
-                scurve_step(&path);
+                scurve_step(&curve);
             }
         }
-        for (unsigned i = 0; i < slots; i++) {
-            pos_q32[i] = halted_q32[i] + scurve_between(&path, way->from_q32[i], way->to_q32[i]) - way->from_q32[i];
+        for (unsigned i = 0; i < path->axes; i++) {
+            pos_q32[i] = stopped_q32[i] + scurve_between(&curve, line->from_q32[i], line->to_q32[i]) - line->from_q32[i];
         }
-        if (!are_within(slot, sample, pos_q32, slots, slot_list, n)) {
+        if (!are_within(axis, sample, pos_q32, path->axes, axis_list, n)) {
             return false;
         }
         for (unsigned i = 0; i < POSE_AXES; i++) {
             pose.axis_q32[i] = pos_q32[i];
         }
-        if (motion->space == MOTION_POSE &&
-            (kin_inverse(&motion->kin, &pose, extension_mm_q32) != HV_OK ||
-             !are_within(cylinder, sample, extension_mm_q32, motion->cylinders, cylinder_list, n))) {
+        if (followed->space == MOTION_POSE &&
+            (kin_inverse(&platform->kin, &pose, extension_mm_q32) != HV_OK ||
+             !are_within(cylinder, sample, extension_mm_q32, platform->cylinders, cylinder_list, n))) {
             return false;
         }
     }

@@ -8,14 +8,16 @@
 #include "heave/motion.h"
 
 /** True if every cylinder can follow the poses of a quintic (33 of them are looked at). */
-bool path_check_is_feasible(const motion_t *motion, const quintic_t *quintic);
+bool path_check_is_feasible(const platform_t *platform, const quintic_t *quintic);
 
-/** Narrows path limits so that every cylinder keeps its own on the straight way between two poses (17 of them are looked at). */
-void path_check_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits);
+/** Narrows path limits so that every cylinder keeps its own on the straight line between two poses (17 of them are looked at).
+ *  @param limiter of each cylinder, whose limits count */
+void path_check_narrow(const platform_t *platform, const ramp_t *limiter, const q32_t *from_q32, const q32_t *to_q32,
+                       path_limits_t *limits);
 
-/** True if axes and cylinders keep their limits while motion->halt and motion->plan.straight are made together, the straight way
- * from a cycle of the stop on (33 points are looked at). What the stop alone asks of the cylinders counts too.
- *  @param after cycles of the stop before the straight way begins */
-bool path_check_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after);
+/** True if axes and cylinders keep their limits along a PATH_STOP_AND_STRAIGHT whose straight line begins in a cycle of the stop
+ *  (33 points are looked at). What the stop alone asks of the cylinders counts too.
+ *  @param after cycles of the stop before the straight line begins */
+bool path_check_blend_is_feasible(const platform_t *platform, const followed_t *followed, const path_t *path, int64_t after);
 
 #endif

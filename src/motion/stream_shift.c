@@ -3,6 +3,31 @@
  */
 #include "stream_shift.h"
 
+#include "stream_evidence.h"
+
+#define LARGER 4 /* times as large as three steps around it is a jump */
+
+/* Half of the motion between the sample before the jump and the one that jumped went as before, half as since then. */
+bool stream_find_jump(const stream_t *self, const q32_t newest_q32[POSE_AXES], const q32_t step_q32[POSE_AXES],
+                      q32_t by_q32[POSE_AXES])
+{
+    const stream_evidence_t *seen = &self->evidence;
+    const governor_t *scale = &self->curve.governor;
+    q32_t size_q32 = 0;
+    q32_t around_q32 = 0;
+    if (seen->count < 3) {
+        return false;
+    }
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        const q32_t after_q32 = seen->value_q32[0][i] - seen->value_q32[1][i];
+        const q32_t before_q32 = seen->value_q32[1][i] - seen->value_q32[2][i];
+        by_q32[i] = newest_q32[i] - seen->value_q32[0][i] - step_q32[i] - (after_q32 + step_q32[i]) / 2;
+        size_q32 += stream_evidence_in_speed_limits(scale, i, by_q32[i]);
+        around_q32 += stream_evidence_in_speed_limits(scale, i, fx_abs(after_q32) + fx_abs(before_q32) + fx_abs(step_q32[i]));
+    }
+    return size_q32 > around_q32 * LARGER;
+}
+
 static void shift_curve(stream_curve_t *curve, unsigned axis, q32_t by_q32)
 {
     for (unsigned i = 0; i < STREAM_POINTS; i++) {

@@ -11,6 +11,6 @@
  *  @param extension_mm_q32 out: the extensions of the resulting pose
  *  @param share_q62 out, may be NULL: how much of that way is left, Q62_ONE where the pose could be kept
  *  @return 0 where the pose could be kept; else 1-based, the cylinder that bounds it */
-unsigned workspace_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62);
+unsigned workspace_pull_in(const platform_t *platform, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62);
 
 #endif

@@ -164,7 +164,7 @@ static bool is_on_target(const ride_t *ride)
  * where no sample is missing, as it is found anew before it is used. */
 static void essence(motion_t *motion)
 {
-    motion->last_us = 0;
+    motion->times.last_us = 0;
     motion->gate = (spike_filter_t){0};
     stream_t *stream = &motion->stream;
     memset(&stream->thin, 0, sizeof stream->thin);

@@ -33,11 +33,11 @@ static void step(double most_mm_s)
 {
     q32_t before_q32[CYLINDERS_MAX];
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        before_q32[i] = m_motion.cylinder[i].state.pos_q32;
+        before_q32[i] = m_motion.platform.cylinder[i].state.pos_q32;
     }
     m_now_us += CYCLE_US;
     motion_step(&m_motion, m_now_us, &m_out);
-    for (unsigned i = 0; i < m_motion.cylinders; i++) {
+    for (unsigned i = 0; i < m_motion.platform.cylinders; i++) {
         TEST_ASSERT_TRUE((double)llabs(m_out.extension_mm_q32[i] - before_q32[i]) / 4294967.296 <= most_mm_s);
     }
 }
@@ -70,7 +70,7 @@ static void start_following(void)
 
 static void assert_extensions(const q32_t *expected_q32)
 {
-    for (unsigned i = 0; i < m_motion.cylinders; i++) {
+    for (unsigned i = 0; i < m_motion.platform.cylinders; i++) {
         TEST_ASSERT_EQUAL_INT64(expected_q32[i], m_out.extension_mm_q32[i]);
     }
 }
@@ -80,12 +80,12 @@ static void assert_extensions(const q32_t *expected_q32)
 static void test_done_is_not_before_the_last_cylinder_rests(void)
 {
     TEST_ASSERT_TRUE(motion_is_done(&m_motion));
-    m_motion.cylinder[4].state.pos_q32 += Q32_ONE / 10;
-    m_motion.cylinder[4].state.vel_per_cycle_q32 = Q32_ONE / 100;
+    m_motion.platform.cylinder[4].state.pos_q32 += Q32_ONE / 10;
+    m_motion.platform.cylinder[4].state.vel_per_cycle_q32 = Q32_ONE / 100;
     TEST_ASSERT_FALSE(motion_is_done(&m_motion));
     run_ms(500, 50);
     TEST_ASSERT_TRUE(motion_is_done(&m_motion));
-    assert_extensions(m_motion.settled_mm_q32);
+    assert_extensions(m_motion.platform.settled_mm_q32);
 }
 
 static void test_path_is_not_over_before_a_cylinder_thrown_off_is_back(void)
@@ -93,9 +93,9 @@ static void test_path_is_not_over_before_a_cylinder_thrown_off_is_back(void)
     motion_rise(&m_motion);
     run_ms(10, 50);
     TEST_ASSERT_EQUAL(MOTION_ON_PATH, m_motion.source);
-    while (!scurve_is_done(&m_motion.plan.straight.path)) {
+    while (!scurve_is_done(&m_motion.plan.path.way.straight.curve)) {
         TEST_ASSERT_FALSE(motion_is_done(&m_motion));
-        m_motion.cylinder[2].state.pos_q32 -= Q32_ONE / 1000; /* pushed down all the way */
+        m_motion.platform.cylinder[2].state.pos_q32 -= Q32_ONE / 1000; /* pushed down all the way */
         step(400);
     }
     for (unsigned i = 0; i < 3; i++) {
@@ -105,7 +105,7 @@ static void test_path_is_not_over_before_a_cylinder_thrown_off_is_back(void)
     }
     run_ms(500, 400);
     TEST_ASSERT_TRUE(motion_is_done(&m_motion));
-    assert_extensions(m_motion.neutral_mm_q32);
+    assert_extensions(m_motion.platform.neutral_mm_q32);
 }
 
 /* ---- targets that cannot be ---- */
@@ -141,7 +141,7 @@ static void test_target_that_intensity_makes_impossible_while_it_waits_is_droppe
     take(&target);
     TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 100));
     run_ms(1000, 0);
-    assert_extensions(m_motion.neutral_mm_q32);
+    assert_extensions(m_motion.platform.neutral_mm_q32);
     take(&pose); /* what comes then is followed */
     run_ms(5000, 50);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10, mm(m_out.sent.axis_q32[AXIS_Z]));
@@ -180,7 +180,7 @@ static void test_axis_that_is_not_moved_is_told_and_left_out(void)
     take(&target);
     run_ms(5000, 50);
     TEST_ASSERT_BITS_HIGH(MOTION_CLAMPED, m_out.flags);
-    TEST_ASSERT_EQUAL_INT64(0, m_motion.slot_q32[AXIS_X]);
+    TEST_ASSERT_EQUAL_INT64(0, m_motion.targets.value_q32[AXIS_X]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10, mm(m_out.sent.axis_q32[AXIS_Z]));
 }
 
@@ -231,10 +231,10 @@ static void take_extensions(double all_mm, bool is_timed)
  * engage speed all the way. */
 static void check_jumps_are_left(double jump_mm, bool is_timed)
 {
-    const ramp_limits_t *limits = &m_motion.cylinder[0].limits;
+    const ramp_limits_t *limits = &m_motion.platform.cylinder[0].limits;
     init(rig_hexapod());
     start_following();
-    for (unsigned ms = 0; llabs(m_motion.led[0].acc_per_cycle2_q32) <= 2 * limits->acc_per_cycle2_q32; ms++) {
+    for (unsigned ms = 0; llabs(m_motion.followed.past[0].acc_per_cycle2_q32) <= 2 * limits->acc_per_cycle2_q32; ms++) {
         TEST_ASSERT_TRUE(ms < 1300);
         if (ms % 10 == 0) {
             const double off_mm = ms / 10 % 2 ? jump_mm : -jump_mm;
@@ -242,7 +242,7 @@ static void check_jumps_are_left(double jump_mm, bool is_timed)
         }
         step(50.1);
     }
-    TEST_ASSERT_TRUE(jump_mm > 0.3 || llabs(m_motion.led[0].vel_per_cycle_q32) < limits->vel_per_cycle_q32);
+    TEST_ASSERT_TRUE(jump_mm > 0.3 || llabs(m_motion.followed.past[0].vel_per_cycle_q32) < limits->vel_per_cycle_q32);
     take_extensions(120, true);
     if (!is_timed) {
         take_extensions(120, false);
@@ -271,9 +271,9 @@ static void test_way_where_nothing_can_be_solved_is_not_feasible(void)
     const q32_t near_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(10)};
     quintic_t quintic;
     TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, POSE_AXES, start, near_q32, 1000));
-    TEST_ASSERT_TRUE(path_check_is_feasible(&m_motion, &quintic));
+    TEST_ASSERT_TRUE(path_check_is_feasible(&m_motion.platform, &quintic));
     TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, POSE_AXES, rest, beyond_q32, 1000));
-    TEST_ASSERT_FALSE(path_check_is_feasible(&m_motion, &quintic));
+    TEST_ASSERT_FALSE(path_check_is_feasible(&m_motion.platform, &quintic));
 }
 
 static void test_way_where_nothing_can_be_solved_narrows_nothing(void)
@@ -283,9 +283,9 @@ static void test_way_where_nothing_can_be_solved_narrows_nothing(void)
     const q32_t beyond_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(20000)};
     const path_limits_t none = path_limits_none();
     path_limits_t limits = none;
-    path_check_narrow(&m_motion, from_q32, beyond_q32, &limits);
+    path_check_narrow(&m_motion.platform, m_motion.platform.cylinder, from_q32, beyond_q32, &limits);
     TEST_ASSERT_EQUAL_MEMORY(&none, &limits, sizeof limits);
-    path_check_narrow(&m_motion, from_q32, near_q32, &limits);
+    path_check_narrow(&m_motion.platform, m_motion.platform.cylinder, from_q32, near_q32, &limits);
     TEST_ASSERT_TRUE(limits.vel_q62 < none.vel_q62 && limits.acc_q62 < none.acc_q62 && limits.jerk_q62 < none.jerk_q62);
 }
 
@@ -373,7 +373,7 @@ static void test_timed_move_planned_while_the_intensity_changes_starts_where_the
     take(&target);
     for (unsigned ms = 0; ms < 3000; ms++) {
         step(400);
-        TEST_ASSERT_EQUAL(MOTION_TIMED, m_motion.source);
+        TEST_ASSERT_EQUAL(MOTION_PLANNED, m_motion.source);
         TEST_ASSERT_DOUBLE_WITHIN(1e-4, mm(m_out.asked.axis_q32[AXIS_Z]), mm(m_out.sent.axis_q32[AXIS_Z]));
     }
     run_ms(10, 400);

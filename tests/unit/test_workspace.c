@@ -50,17 +50,17 @@ static pose_t random_pose(void)
 {
     pose_t pose;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const ramp_limits_t *limits = &m_motion.axis[i].limits;
+        const ramp_limits_t *limits = &m_motion.platform.axis[i].limits;
         const double middle = (double)(limits->pos_min_q32 / 2 + limits->pos_max_q32 / 2);
         const double half = (double)(limits->pos_max_q32 / 2 - limits->pos_min_q32 / 2);
-        pose.axis_q32[i] = m_motion.is_axis_moved[i] ? (q32_t)(middle + half * random_unit()) : 0;
+        pose.axis_q32[i] = m_motion.platform.is_axis_moved[i] ? (q32_t)(middle + half * random_unit()) : 0;
     }
     return pose;
 }
 
 static double room_mm(const q32_t *extension_mm_q32, unsigned cylinder)
 {
-    const ramp_limits_t *limits = &m_motion.cylinder[cylinder].limits;
+    const ramp_limits_t *limits = &m_motion.platform.cylinder[cylinder].limits;
     return fmin((double)(extension_mm_q32[cylinder] - limits->pos_min_q32),
                 (double)(limits->pos_max_q32 - extension_mm_q32[cylinder])) /
            LSB;
@@ -88,9 +88,9 @@ static void test_reach_pull_in_result_is_inside_on_the_way_and_bounded_by_the_na
             pose_t pose = asked;
             q32_t extension[CYLINDERS_MAX], judged[CYLINDERS_MAX];
             q62_t share = 0;
-            const unsigned cylinder = workspace_pull_in(&m_motion, &pose, extension, &share);
-            TEST_ASSERT_EQUAL(HV_OK, kin_inverse(&m_motion.kin, &pose, judged));
-            for (unsigned i = 0; i < m_motion.cylinders; i++) {
+            const unsigned cylinder = workspace_pull_in(&m_motion.platform, &pose, extension, &share);
+            TEST_ASSERT_EQUAL(HV_OK, kin_inverse(&m_motion.platform.kin, &pose, judged));
+            for (unsigned i = 0; i < m_motion.platform.cylinders; i++) {
                 TEST_ASSERT_EQUAL_INT64(judged[i], extension[i]);
                 TEST_ASSERT_TRUE(room_mm(judged, i) >= 0);
             }
@@ -99,13 +99,14 @@ static void test_reach_pull_in_result_is_inside_on_the_way_and_bounded_by_the_na
                 continue;
             }
             outside++;
-            TEST_ASSERT_TRUE(cylinder <= m_motion.cylinders);
+            TEST_ASSERT_TRUE(cylinder <= m_motion.platform.cylinders);
             farthest_room = fmax(farthest_room, room_mm(judged, cylinder - 1));
-            const double whole = distance(&asked, &m_motion.neutral), kept = distance(&pose, &m_motion.neutral);
+            const double whole = distance(&asked, &m_motion.platform.neutral), kept = distance(&pose, &m_motion.platform.neutral);
             pose_t on_way;
             for (unsigned i = 0; i < POSE_AXES; i++) {
-                on_way.axis_q32[i] = m_motion.neutral.axis_q32[i] +
-                                     (q32_t)((double)(asked.axis_q32[i] - m_motion.neutral.axis_q32[i]) * (kept / whole));
+                on_way.axis_q32[i] =
+                    m_motion.platform.neutral.axis_q32[i] +
+                    (q32_t)((double)(asked.axis_q32[i] - m_motion.platform.neutral.axis_q32[i]) * (kept / whole));
             }
             worst_direction = fmax(worst_direction, distance(&pose, &on_way) / kept);
         }
@@ -121,18 +122,18 @@ static void test_reach_pull_in_result_is_inside_on_the_way_and_bounded_by_the_na
 static void test_reach_pull_in_pose_beyond_all_solving_comes_in_too(void)
 {
     load(0);
-    pose_t asked = m_motion.neutral, pose;
+    pose_t asked = m_motion.platform.neutral, pose;
     asked.axis_q32[AXIS_Z] += q32_from_int(12000);
     pose = asked;
     q32_t extension[CYLINDERS_MAX];
-    TEST_ASSERT_EQUAL(HV_ERR_RANGE, kin_inverse(&m_motion.kin, &asked, extension));
-    const unsigned cylinder = workspace_pull_in(&m_motion, &pose, extension, NULL);
-    TEST_ASSERT_EQUAL(HV_OK, kin_inverse(&m_motion.kin, &pose, extension));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, kin_inverse(&m_motion.platform.kin, &asked, extension));
+    const unsigned cylinder = workspace_pull_in(&m_motion.platform, &pose, extension, NULL);
+    TEST_ASSERT_EQUAL(HV_OK, kin_inverse(&m_motion.platform.kin, &pose, extension));
     double least = 1e9;
-    for (unsigned i = 0; i < m_motion.cylinders; i++) {
+    for (unsigned i = 0; i < m_motion.platform.cylinders; i++) {
         least = fmin(least, room_mm(extension, i));
     }
-    TEST_ASSERT_TRUE(cylinder != 0 && pose.axis_q32[AXIS_Z] > m_motion.neutral.axis_q32[AXIS_Z]);
+    TEST_ASSERT_TRUE(cylinder != 0 && pose.axis_q32[AXIS_Z] > m_motion.platform.neutral.axis_q32[AXIS_Z]);
     TEST_ASSERT_TRUE(least >= 0 && least < 1);
 }
 
@@ -152,7 +153,7 @@ static void test_reach_pull_in_is_continuous(void)
                 for (unsigned i = 0; i < POSE_AXES; i++) {
                     pose.axis_q32[i] = from.axis_q32[i] + (to.axis_q32[i] - from.axis_q32[i]) / 400 * k;
                 }
-                (void)workspace_pull_in(&m_motion, &pose, extension, NULL);
+                (void)workspace_pull_in(&m_motion.platform, &pose, extension, NULL);
                 worst = k > 0 ? fmax(worst, distance(&pose, &last) / step) : worst;
                 last = pose;
             }
