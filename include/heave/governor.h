@@ -34,18 +34,18 @@ typedef struct {
     q32_t jerk_per_cycle3_q32; /**< 0: the channel has no limits */
 } governor_limits_t;
 
-/** A value with its differences per period; private to src/motion. */
+/** A value with its differences per period; private to src/stream. */
 typedef struct {
     q32_t pos_q32, vel_q32, acc_q32;
 } governor_track_t;
 
-/** A time in which more was needed than the limits allow; private to src/motion. */
+/** A time in which more was needed than the limits allow; private to src/stream. */
 typedef struct {
     uint32_t age_us;                       /**< since it began */
     int32_t need_q16[GOVERNOR_LEVELS + 1]; /**< of each level, the largest share of a limit */
 } governor_event_t;
 
-/** Members are private to src/motion. */
+/** Members are private to src/stream. */
 typedef struct {
     governor_limits_t limits[GOVERNOR_CHANNELS];
     unsigned channels;                           /**< number of channels with limits; they come first */

@@ -4,7 +4,6 @@
 #include "jump.h"
 
 #include "plan.h"
-#include "stream_shift.h"
 
 #define FAR_Q32          q32_from_int(65536) /* no axis goes so far */
 #define JERK_MAX_Q32     (16 * Q32_ONE)      /* at an intensity of 0 nothing limits a line */

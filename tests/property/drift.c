@@ -174,7 +174,7 @@ static void essence(motion_t *motion)
     stream->between_q32 = stream->error_q32 = stream->rate_q32[0] = stream->rate_q32[1] = 0;
     stream_curve_t *curve = &stream->curve;
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        curve->lead[i] = (stream_lead_t){0};
+        curve->extrapolation[i] = (stream_extrapolation_t){0};
         curve->low_q32[i] = curve->high_q32[i] =
             0; /* the recent range narrows for half a minute; off_q32, which it bounds, is compared */
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * test_governor_speed.c - what the governor leaves of speeds beyond the limits, and how it catches up.
  */
-#include "../../src/motion/governor_speed.h"
+#include "../../src/stream/governor_speed.h"
 
 #include "unity.h"
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT
  * test_stream_curve.c - states of the curve and of the clock that a stream seldom or never gets into, made by hand.
  */
-#include "../../src/motion/stream_curve.h"
+#include "../../src/stream/stream_curve.h"
 
 #include <string.h>
 
-#include "../../src/motion/stream_clock.h"
+#include "../../src/stream/stream_clock.h"
 #include "unity.h"
 
 #define PERIOD_US 20000u

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT
  * test_stream_predictor.c - where the motion of a stream's newest points leads.
  */
-#include "../../src/motion/stream_predictor.h"
+#include "../../src/stream/stream_predictor.h"
 
 #include <math.h>
 
-#include "../../src/motion/stream_points.h"
+#include "../../src/stream/stream_points.h"
 #include "unity.h"
 
 static stream_curve_t m_curve;
@@ -27,7 +27,7 @@ static q32_t q32(double value)
 static void place(unsigned axis, double (*at)(int period))
 {
     for (int back = 0; back < 20; back++) {
-        m_curve.point_q32[stream_points_slot(m_curve.head - (uint32_t)back)][axis] = q32(at(-back));
+        m_curve.point_q32[stream_points_place(m_curve.head - (uint32_t)back)][axis] = q32(at(-back));
     }
 }
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT
  * test_stream_sample.c - what a frame of a stream is: the next sample, a repetition, a frozen value, an old one.
  */
-#include "../../src/motion/stream_sample.h"
+#include "../../src/stream/stream_sample.h"
 
 #include <math.h>
 
-#include "../../src/motion/stream_points.h"
+#include "../../src/stream/stream_points.h"
 #include "unity.h"
 
 #define PERIOD_US 16667u

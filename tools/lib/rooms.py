@@ -7,10 +7,11 @@ CORE = {
     "fixed": set(),
     "protocol": {"fixed"},
     "kinematics": {"fixed"},
-    "motion": {"fixed", "kinematics"},
+    "stream": {"fixed", "kinematics"},
+    "motion": {"fixed", "kinematics", "stream"},
     "drives": {"fixed"},
     "canopen": {"fixed", "drives"},
-    "gateway": {"fixed", "protocol", "kinematics", "motion", "drives", "canopen"},
+    "gateway": {"fixed", "protocol", "kinematics", "stream", "motion", "drives", "canopen"},
 }
 PROGRAMS = {
     "common": set(),

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * stream_guess.c - points of a stream's curve where samples are missing; see stream_guess.h.
+ * stream_extrapolation.c - points of a stream's curve where samples are missing; see stream_extrapolation.h.
  */
-#include "stream_guess.h"
+#include "stream_extrapolation.h"
 
 #include "stream_curve.h"
 #include "stream_points.h"
@@ -14,7 +14,7 @@ enum {
 
 /* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
  * is sqrt(v / J), or half of v / A + A / J where the acceleration binds. Also the share of such a stop in which A builds up. */
-static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32, stream_lead_t *on)
+static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32, stream_extrapolation_t *on)
 {
     const governor_limits_t *stop = &self->limits[axis];
     const q32_t vel_q32 = fx_mul_div(step_q32, Q16_ONE, self->period_cycles_q16);
@@ -43,7 +43,7 @@ static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32
     on->rise_q32 = (uint32_t)fx_clamp(fx_mul_div(rise_periods_q16, Q32_ONE, 2 * stop_q16 + 1), 0, Q32_ONE / 2);
 }
 
-q32_t stream_guess_within_speed(const stream_curve_t *self, unsigned axis, q32_t step_q32)
+q32_t stream_extrapolation_within_speed(const stream_curve_t *self, unsigned axis, q32_t step_q32)
 {
     const governor_limits_t *limits = &self->limits[axis];
     const int64_t n_q16 = self->period_cycles_q16;
@@ -60,7 +60,7 @@ static q32_t largest_step(const stream_curve_t *self, unsigned axis, const q32_t
     if (self->age < FEW) {
         const bool is_one_way = (step_q32[0] < 0) == (step_q32[1] < 0);
         const q32_t smaller_q32 = fx_abs(step_q32[0]) < fx_abs(step_q32[1]) ? fx_abs(step_q32[0]) : fx_abs(step_q32[1]);
-        return stream_guess_within_speed(self, axis, is_one_way ? smaller_q32 : 0);
+        return stream_extrapolation_within_speed(self, axis, is_one_way ? smaller_q32 : 0);
     }
     q32_t largest_q32 = 0;
     q32_t second_q32 = 0;
@@ -70,31 +70,31 @@ static q32_t largest_step(const stream_curve_t *self, unsigned axis, const q32_t
         second_q32 = smaller_q32 > second_q32 ? smaller_q32 : second_q32;
         largest_q32 = size_q32 > largest_q32 ? size_q32 : largest_q32;
     }
-    return stream_guess_within_speed(self, axis, 2 * second_q32);
+    return stream_extrapolation_within_speed(self, axis, 2 * second_q32);
 }
 
 /* The next step of the motion. */
-static q32_t next_step(const stream_curve_t *self, const stream_lead_t *on)
+static q32_t next_step(const stream_curve_t *self, const stream_extrapolation_t *on)
 {
     return fx_clamp(stream_predictor_next(&self->predictor, on->step_q32, on->before_q32), -on->most_q32, on->most_q32);
 }
 
-HV_WRAPS void stream_guess_begin(stream_curve_t *self)
+HV_WRAPS void stream_extrapolation_begin(stream_curve_t *self)
 {
     const uint32_t newest = stream_points_newest(self);
     self->predictor = stream_predictor_fit(self, (stream_predictor_t){.by_newest_q32 = Q32_ONE}); /* even */
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        stream_lead_t *on = &self->lead[axis];
+        stream_extrapolation_t *on = &self->extrapolation[axis];
         q32_t step_q32[LARGEST_OF];
         for (uint32_t i = 0; i < LARGEST_OF; i++) {
-            step_q32[i] =
-                self->point_q32[stream_points_slot(newest - i)][axis] - self->point_q32[stream_points_slot(newest - i - 1)][axis];
+            step_q32[i] = self->point_q32[stream_points_place(newest - i)][axis] -
+                          self->point_q32[stream_points_place(newest - i - 1)][axis];
         }
         on->step_q32 = step_q32[0];
         on->before_q32 = step_q32[1];
         on->most_q32 = largest_step(self, axis, step_q32);
         on->first_q32 = next_step(self, on);
-        find_reach(self, axis, stream_guess_within_speed(self, axis, fx_abs(step_q32[0])), on);
+        find_reach(self, axis, stream_extrapolation_within_speed(self, axis, fx_abs(step_q32[0])), on);
     }
 }
 
@@ -110,7 +110,7 @@ static q32_t lost_q32(q32_t time_q32, q32_t rise_q32)
 }
 
 /* Steps that so many periods go: full steps, then the way of the quickest stop, whose second half is its first reversed. */
-static int64_t way_q16(const stream_lead_t *on, int64_t periods)
+static int64_t way_q16(const stream_extrapolation_t *on, int64_t periods)
 {
     const int64_t full_q16 = on->full_q16;
     const int64_t stop_q16 = 2 * (on->reach_q16 - full_q16);
@@ -125,15 +125,15 @@ static int64_t way_q16(const stream_lead_t *on, int64_t periods)
 }
 
 /* The motion goes on, ever more slowly. */
-HV_WRAPS void stream_guess_point(stream_curve_t *self, int32_t periods)
+HV_WRAPS void stream_extrapolation_point(stream_curve_t *self, int32_t periods)
 {
     const uint32_t index = stream_points_newest(self) + (uint32_t)periods;
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        stream_lead_t *on = &self->lead[axis];
+        stream_extrapolation_t *on = &self->extrapolation[axis];
         const q32_t step_q32 = next_step(self, on);
         const int64_t share_q16 = way_q16(on, periods) - way_q16(on, periods - 1);
-        self->point_q32[stream_points_slot(index)][axis] =
-            self->point_q32[stream_points_slot(index - 1)][axis] + fx_mul_shift(step_q32, share_q16, 16);
+        self->point_q32[stream_points_place(index)][axis] =
+            self->point_q32[stream_points_place(index - 1)][axis] + fx_mul_shift(step_q32, share_q16, 16);
         on->before_q32 = on->step_q32;
         on->step_q32 = step_q32;
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * stream_clock.h - the time line of a sender, found from the arrivals of its samples: period, lateness, losses, and how long a
- * sample has to be waited for. Reads no clock; private to src/motion.
+ * sample has to be waited for. Reads no clock; private to src/stream.
  */
 #ifndef STREAM_CLOCK_H
 #define STREAM_CLOCK_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * stream_repeat.h - senders that send each value several times: a loop of 100 Hz beside a game of 50. Private to src/motion.
+ * stream_repeat.h - senders that send each value several times: a loop of 100 Hz beside a game of 50. Private to src/stream.
  */
 #ifndef STREAM_REPEAT_H
 #define STREAM_REPEAT_H

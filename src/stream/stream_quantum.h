@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * stream_quantum.h - what the values of a sender are multiples of: whole millimetres, tenths of a degree. Private to src/motion.
+ * stream_quantum.h - what the values of a sender are multiples of: whole millimetres, tenths of a degree. Private to src/stream.
  */
 #ifndef STREAM_QUANTUM_H
 #define STREAM_QUANTUM_H

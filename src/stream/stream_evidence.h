@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * stream_evidence.h - to which time a sender's samples belong: to their place on the time line (even values, made late by a
  * network or a timer), to the time when they came (a program that takes them when it sends), or to a time between. Private to
- * src/motion.
+ * src/stream.
  */
 #ifndef STREAM_EVIDENCE_H
 #define STREAM_EVIDENCE_H

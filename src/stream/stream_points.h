@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * stream_points.h - the ring of points of a stream's curve. Private to src/motion.
+ * stream_points.h - the ring of points of a stream's curve. Private to src/stream.
  */
 #ifndef STREAM_POINTS_H
 #define STREAM_POINTS_H
@@ -7,7 +7,7 @@
 #include "heave/stream.h"
 
 /* Where the ring has an index; indices wrap. */
-static inline unsigned stream_points_slot(uint32_t index)
+static inline unsigned stream_points_place(uint32_t index)
 {
     return index % STREAM_POINTS;
 }

@@ -24,17 +24,17 @@ HV_WRAPS static q32_t mean_point(const stream_curve_t *self, unsigned axis, uint
     const int32_t window = self->window;
     int64_t sum_q32 = 0;
     if (window == 1) {
-        const q32_t here_q32 = self->point_q32[stream_points_slot(index)][axis];
+        const q32_t here_q32 = self->point_q32[stream_points_place(index)][axis];
         if (self->mean_q32 == 0) {
             return here_q32;
         }
         for (uint32_t back = 1; back < self->mean_points; back++) {
-            sum_q32 += self->point_q32[stream_points_slot(index - back)][axis] - here_q32;
+            sum_q32 += self->point_q32[stream_points_place(index - back)][axis] - here_q32;
         }
         return here_q32 + fx_mul_shift(sum_q32 / (int64_t)self->mean_points, self->mean_q32, 32);
     }
     for (int32_t back = 0; back < 3 * window - 2; back++) {
-        sum_q32 += self->weight[back] * self->point_q32[stream_points_slot(index - (uint32_t)back)][axis];
+        sum_q32 += self->weight[back] * self->point_q32[stream_points_place(index - (uint32_t)back)][axis];
     }
     return sum_q32 / (window * window * window);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * stream_predictor.h - where the motion of a stream's newest points leads: a linear prediction of second order (AR(2)) of the
  * step from one point to the next. An even motion has the coefficients 1 and 0, an oscillation of angle w per period 2 cos w and
- * -1. Private to src/motion.
+ * -1. Private to src/stream.
  */
 #ifndef STREAM_PREDICTOR_H
 #define STREAM_PREDICTOR_H

@@ -10,7 +10,7 @@
 #include "stream_curve.h"
 
 #include "stream_control.h"
-#include "stream_guess.h"
+#include "stream_extrapolation.h"
 #include "stream_offset.h"
 #include "stream_points.h"
 #include "stream_quantum.h"
@@ -86,7 +86,7 @@ void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sam
     for (unsigned axis = 0; axis < self->axes; axis++) {
         self->way_q36[0][axis] = self->way_q36[1][axis] = self->way_q36[2][axis] = 0;
         self->off_q32[axis][0] = self->off_q32[axis][1] = self->off_q32[axis][2] = 0;
-        self->lead[axis] = (stream_lead_t){0};
+        self->extrapolation[axis] = (stream_extrapolation_t){0};
         self->quantum[axis] = (stream_quantum_t){0};
         self->low_q32[axis] = self->high_q32[axis] = sample_q32[axis];
     }
@@ -140,11 +140,11 @@ static void keep_going(stream_curve_t *self)
     stream_control_at_head(self, is_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const q32_t here_q32 = self->was_q32[0][axis] - is_q32[0][axis];
-        const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + fx_abs(here_q32) / 16;
+        const q32_t most_q32 = 4 * fx_abs(self->extrapolation[axis].first_q32) + fx_abs(here_q32) / 16;
         const q32_t change_q32 = fx_clamp((here_q32 - (self->was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
         self->off_q32[axis][0] += here_q32;
         self->off_q32[axis][1] =
-            stream_guess_within_speed(self, axis, self->off_q32[axis][1] + fx_mul_shift(change_q32, share_q32, 32));
+            stream_extrapolation_within_speed(self, axis, self->off_q32[axis][1] + fx_mul_shift(change_q32, share_q32, 32));
     }
 }
 
@@ -179,9 +179,9 @@ void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t peri
 /* Guesses the committed points after the newest sample again. */
 static void guess_again(stream_curve_t *self)
 {
-    stream_guess_begin(self);
+    stream_extrapolation_begin(self);
     for (int32_t periods = 1; periods <= -self->ahead; periods++) {
-        stream_guess_point(self, periods);
+        stream_extrapolation_point(self, periods);
     }
 }
 
@@ -191,8 +191,8 @@ HV_WRAPS static void relabel(stream_curve_t *self, int32_t ahead)
     const uint32_t was = stream_points_newest(self);
     self->ahead = ahead;
     for (uint32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
-        copy_point(self, self->point_q32[stream_points_slot(stream_points_newest(self) - back)],
-                   self->point_q32[stream_points_slot(was - back)]);
+        copy_point(self, self->point_q32[stream_points_place(stream_points_newest(self) - back)],
+                   self->point_q32[stream_points_place(was - back)]);
     }
 }
 
@@ -229,9 +229,9 @@ static q32_t point_between(q32_t before_q32, q32_t last_q32, q32_t next_q32, int
  * those that are not committed yet is improved then. */
 HV_WRAPS static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t *before_q32)
 {
-    const q32_t *const two_before_q32 = self->point_q32[stream_points_slot(stream_points_newest(self) - 3)];
+    const q32_t *const two_before_q32 = self->point_q32[stream_points_place(stream_points_newest(self) - 3)];
     for (int32_t back = 1; back < periods && back < self->ahead + BEHIND_MAX; back++) {
-        q32_t *const point_q32 = self->point_q32[stream_points_slot(stream_points_newest(self) - (uint32_t)back)];
+        q32_t *const point_q32 = self->point_q32[stream_points_place(stream_points_newest(self) - (uint32_t)back)];
         for (unsigned axis = 0; axis < self->axes; axis++) {
             const q32_t way = self->last_q32[axis] - before_q32[axis];
             point_q32[axis] = periods == 2 ? point_between(two_before_q32[axis], before_q32[axis], self->last_q32[axis], 2)
@@ -258,12 +258,12 @@ HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, bool i
     const int32_t ahead = self->ahead + (int32_t)periods;
     const int32_t kept = ahead < AHEAD_MAX ? ahead : AHEAD_MAX;
     for (int32_t i = self->ahead > 0 ? self->ahead + 1 : 1; i < kept; i++) {
-        self->is_sample[stream_points_slot(self->head + (uint32_t)i)] = false;
+        self->is_sample[stream_points_place(self->head + (uint32_t)i)] = false;
     }
     self->ahead = kept;
     self->age += self->age < AGE_MAX ? 1 : 0;
-    copy_point(self, self->point_q32[stream_points_slot(stream_points_newest(self))], self->last_q32);
-    self->is_sample[stream_points_slot(stream_points_newest(self))] = true;
+    copy_point(self, self->point_q32[stream_points_place(stream_points_newest(self))], self->last_q32);
+    self->is_sample[stream_points_place(stream_points_newest(self))] = true;
     fill_gap(self, (int32_t)periods, before_q32);
 }
 
@@ -271,12 +271,12 @@ HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, bool i
 HV_WRAPS static void interpolate(stream_curve_t *self, q32_t *point_q32)
 {
     int32_t periods = 2;
-    while (!self->is_sample[stream_points_slot(self->head + (uint32_t)periods)]) {
+    while (!self->is_sample[stream_points_place(self->head + (uint32_t)periods)]) {
         periods++;
     }
-    const q32_t *const next = self->point_q32[stream_points_slot(self->head + (uint32_t)periods)];
-    const q32_t *const last = self->point_q32[stream_points_slot(self->head)];
-    const q32_t *const before = self->point_q32[stream_points_slot(self->head - 1)];
+    const q32_t *const next = self->point_q32[stream_points_place(self->head + (uint32_t)periods)];
+    const q32_t *const last = self->point_q32[stream_points_place(self->head)];
+    const q32_t *const before = self->point_q32[stream_points_place(self->head - 1)];
     for (unsigned axis = 0; axis < self->axes; axis++) {
         point_q32[axis] = point_between(before[axis], last[axis], next[axis], periods);
     }
@@ -289,10 +289,10 @@ HV_WRAPS static void give_up(stream_curve_t *self)
     self->change = STREAM_OFFSET_STALL - 1;
     copy_point(self, self->last_q32, self->newest_q32);
     for (int32_t back = 0; back < self->patience && back < STREAM_POINTS; back++) {
-        copy_point(self, self->point_q32[stream_points_slot(self->head - (uint32_t)back)], self->last_q32);
+        copy_point(self, self->point_q32[stream_points_place(self->head - (uint32_t)back)], self->last_q32);
     }
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        self->lead[axis] = (stream_lead_t){0};
+        self->extrapolation[axis] = (stream_extrapolation_t){0};
     }
     keep_going(self);
     stream_offset_soften_to_limits(self);
@@ -303,17 +303,17 @@ HV_WRAPS static void give_up(stream_curve_t *self)
 HV_WRAPS static void find_next(stream_curve_t *self)
 {
     if (self->ahead > 0) {
-        if (!self->is_sample[stream_points_slot(self->head + 1)]) {
-            interpolate(self, self->point_q32[stream_points_slot(self->head + 1)]);
+        if (!self->is_sample[stream_points_place(self->head + 1)]) {
+            interpolate(self, self->point_q32[stream_points_place(self->head + 1)]);
         }
         return;
     }
     if (self->ahead == 0) {
-        stream_guess_begin(self);
+        stream_extrapolation_begin(self);
     } else if (-self->ahead == self->patience) {
         give_up(self);
     }
-    stream_guess_point(self, 1 - self->ahead);
+    stream_extrapolation_point(self, 1 - self->ahead);
 }
 
 void stream_curve_skip(stream_curve_t *self)
@@ -417,11 +417,12 @@ HV_WRAPS static void place_points(stream_curve_t *self, const q32_t *first_q32, 
         const q32_t travel_q32 = sample_q32[axis] - self->last_q32[axis];
         q32_t step_q32 = (int32_t)periods > self->patience ? 0 : travel_q32 / (int32_t)periods;
         if (!is_seen) {
-            step_q32 = stream_guess_within_speed(self, axis, common_step(step_q32, self->last_q32[axis] - first_q32[axis]));
+            step_q32 =
+                stream_extrapolation_within_speed(self, axis, common_step(step_q32, self->last_q32[axis] - first_q32[axis]));
         }
         for (int32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
             const bool is_before = first_q32 != NULL && is_seen && back > (int32_t)periods;
-            self->point_q32[stream_points_slot(self->head - (uint32_t)back)][axis] =
+            self->point_q32[stream_points_place(self->head - (uint32_t)back)][axis] =
                 is_before ? first_q32[axis] : sample_q32[axis] - back * step_q32;
         }
     }
@@ -434,7 +435,7 @@ HV_WRAPS static void place_off(stream_curve_t *self, unsigned axis, q32_t asked_
     const q32_t point_step_q32 = stream_control_point(self, axis, self->head) - stream_control_point(self, axis, self->head - 1);
     off_q32[0] = asked_q32 - stream_control_point(self, axis, self->head - 1);
     const q32_t most_q32 = fx_abs(step_q32) + jump_speed(self, off_q32[0]);
-    off_q32[1] = stream_guess_within_speed(self, axis, fx_clamp(step_q32 - point_step_q32, -most_q32, most_q32));
+    off_q32[1] = stream_extrapolation_within_speed(self, axis, fx_clamp(step_q32 - point_step_q32, -most_q32, most_q32));
     off_q32[2] = 0;
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * stream_sample.h - what a frame of a stream is: the next sample, or none. One table of rules, in src/motion/DESIGN.md, "What a
- * sample is". Private to src/motion.
+ * stream_sample.h - what a frame of a stream is: the next sample, or none. One table of rules, in src/stream/DESIGN.md, "What a
+ * sample is". Private to src/stream.
  */
 #ifndef STREAM_SAMPLE_H
 #define STREAM_SAMPLE_H

@@ -29,8 +29,8 @@ HV_WRAPS static uint64_t find_steps(const stream_curve_t *curve, unsigned axes, 
     for (unsigned axis = 0; axis < axes; axis++) {
         const int64_t per_speed_q62 = curve->governor.per_limit_q62[axis][0];
         for (uint32_t i = 0; i < STEPS; i++) {
-            const q32_t step = curve->point_q32[stream_points_slot(newest - i)][axis] -
-                               curve->point_q32[stream_points_slot(newest - i - 1)][axis];
+            const q32_t step = curve->point_q32[stream_points_place(newest - i)][axis] -
+                               curve->point_q32[stream_points_place(newest - i - 1)][axis];
             step_q32[axis][i] = per_speed_q62 > 0 ? fx_mul_shift(step, per_speed_q62, 30) : step;
             bits |= (uint64_t)fx_abs(step_q32[axis][i]);
         }

@@ -98,7 +98,7 @@ void stream_offset_bound(stream_curve_t *self, unsigned axis, q32_t point_q32)
 
 void stream_offset_widen(stream_curve_t *self, unsigned axis, q32_t point_q32)
 {
-    const q32_t head_q32 = self->point_q32[stream_points_slot(self->head)][axis];
+    const q32_t head_q32 = self->point_q32[stream_points_place(self->head)][axis];
     self->low_q32[axis] = narrow(self->low_q32[axis], head_q32, self->patience * NARROW);
     self->high_q32[axis] = narrow(self->high_q32[axis], head_q32, self->patience * NARROW);
     widen(self, axis, head_q32);

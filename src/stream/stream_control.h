@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * stream_control.h - control points of a stream's curve: each belongs on its point, on a mean of the points up to it, or is led
- * ahead of it so that the curve is less late. Private to src/motion.
+ * ahead of it so that the curve is less late. Private to src/stream.
  */
 #ifndef STREAM_CONTROL_H
 #define STREAM_CONTROL_H

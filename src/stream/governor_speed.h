@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * governor_speed.h - the first part of the governor: where a speed limit is exceeded, the steps of all channels are made smaller
- * by one factor, and what is left behind is caught up later. Also what the governor calculates with. Private to src/motion.
+ * by one factor, and what is left behind is caught up later. Also what the governor calculates with. Private to src/stream.
  */
 #ifndef GOVERNOR_SPEED_H
 #define GOVERNOR_SPEED_H

@@ -39,6 +39,26 @@ static uint32_t us_of(int64_t us_q16)
     return (uint32_t)(fx_clamp(us_q16, 0, (int64_t)UINT32_MAX * STREAM_US_Q16) / STREAM_US_Q16);
 }
 
+stream_phase_t stream_phase(const stream_t *self)
+{
+    return self->phase;
+}
+
+q32_t stream_quantum_q32(const stream_t *self, unsigned axis)
+{
+    return self->curve.quantum[axis].quantum_q32;
+}
+
+bool stream_is_smoothed(const stream_t *self)
+{
+    return self->curve.governor.strength_q32 >= 2 * Q32_ONE;
+}
+
+bool stream_is_slowed(const stream_t *self)
+{
+    return self->curve.governor.is_slowed;
+}
+
 stream_report_t stream_report(const stream_t *self)
 {
     const stream_clock_t *clock = &self->clock;

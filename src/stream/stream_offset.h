@@ -2,7 +2,7 @@
  * stream_offset.h - the offset of the curve of a stream from its points (`off_q32`: offset, its change per period and per
  * period^2). A filter with three equal poles at 1 - `bandwidth_q32` takes it back to 0. The offset never leads the curve further
  * than the motion has recently been: a correction is not a motion of the sender, but the governor would treat its overshoot as
- * one. Private to src/motion.
+ * one. Private to src/stream.
  */
 #ifndef STREAM_OFFSET_H
 #define STREAM_OFFSET_H

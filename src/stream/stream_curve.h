@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * stream_curve.h - the curve through the samples of a stream: a uniform B-spline with the samples, or points led ahead of them,
  * as control points. A control point is committed when the curve first needs it and never changed afterwards. Knows no time but
- * the period; private to src/motion.
+ * the period; private to src/stream.
  */
 #ifndef STREAM_CURVE_H
 #define STREAM_CURVE_H

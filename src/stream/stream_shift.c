@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * stream_shift.c - see stream_shift.h.
+ * stream_shift.c - a stream that jumps, and one at another place; see heave/stream.h.
  */
-#include "stream_shift.h"
+#include "heave/stream.h"
 
 #include "stream_evidence.h"
 

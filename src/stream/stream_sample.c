@@ -110,8 +110,8 @@ HV_WRAPS static q32_t off_past(const stream_t *stream, const frame_t *frame)
     const uint32_t points = (uint32_t)fx_clamp(OLD_US * STREAM_US_Q16 / stream->clock.period_us_q16, OLD_LEAST, OLD_MOST);
     q32_t least_q32 = INT64_MAX;
     for (uint32_t part = 0; part < points * parts; part++) {
-        const q32_t *const from_q32 = curve->point_q32[stream_points_slot(newest - part / parts)];
-        const q32_t *const to_q32 = curve->point_q32[stream_points_slot(newest - part / parts - 1)];
+        const q32_t *const from_q32 = curve->point_q32[stream_points_place(newest - part / parts)];
+        const q32_t *const to_q32 = curve->point_q32[stream_points_place(newest - part / parts - 1)];
         q32_t off_q32 = 0;
         for (unsigned axis = 0; axis < curve->axes && axis < POSE_AXES; axis++) {
             const q32_t way_q32 = (to_q32[axis] - from_q32[axis]) * (part % parts + 1) / (q32_t)parts;
