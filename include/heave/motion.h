@@ -87,6 +87,9 @@ bool motion_is_done(const motion_t *self);
  *  plate (a singularity). */
 bool motion_is_stopping(const motion_t *self);
 
+/** True while a sender is followed, or its first target is awaited. */
+bool motion_is_following(const motion_t *self);
+
 /** True when every set-point rests. */
 bool motion_is_at_rest(const motion_t *self);
 

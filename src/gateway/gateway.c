@@ -203,21 +203,21 @@ static void write_relays(gateway_t *self, const cycle_t *cycle)
 }
 
 /* A frame may end a hold, and another sender's first one begins anew. */
-static void accept_frame(gateway_t *self, sender_in_t *in, const cycle_t *cycle, const frame_t *frame)
+static void accept_frame(sequencer_t *sequencer, sender_in_t *in, const cycle_t *cycle, const frame_t *frame)
 {
-    in->state = self->sequencer.supervisor.state;
-    const sender_verdict_t verdict = sender_judge(&self->sender, in, frame);
+    in->state = sequencer->supervisor.state;
+    const sender_verdict_t verdict = sender_judge(cycle->sender, in, frame);
     if (verdict == SENDER_REFUSED) {
         return;
     }
     if (verdict == SENDER_NEW && in->state == STATE_ENGAGED) {
         actions_follow(cycle);
     }
-    auto_engage_frame(&self->sequencer.auto_engage, in->now_us);
-    const motion_target_t target = sender_target(&self->sender, in, frame);
-    actions_event(&self->sequencer, EVENT_FRAME, cycle);
-    in->state = self->sequencer.supervisor.state;
-    (void)sender_follow(&self->sender, in, frame, &target);
+    auto_engage_frame(&sequencer->auto_engage, in->now_us);
+    const motion_target_t target = sender_target(cycle->sender, in, frame);
+    actions_event(sequencer, EVENT_FRAME, cycle);
+    in->state = sequencer->supervisor.state;
+    (void)sender_follow(cycle->sender, in, frame, &target);
 }
 
 static void receive_frames(gateway_t *self, const cycle_t *cycle)
@@ -233,7 +233,7 @@ static void receive_frames(gateway_t *self, const cycle_t *cycle)
     frame_receiver_begin(&self->receiver);
     sender_begin(&self->sender, now_us);
     while (frame_receiver_next(&self->receiver, self->settings, &in.io, now_us, &frame)) {
-        accept_frame(self, &in, cycle, &frame);
+        accept_frame(&self->sequencer, &in, cycle, &frame);
     }
     in.state = self->sequencer.supervisor.state;
     sender_end(&self->sender, &in);
@@ -344,6 +344,18 @@ static void publish(gateway_t *self, const cycle_t *cycle)
     reports_step(&self->reports, self->io.drives, self->io.log, cycle->now_us, s->report);
 }
 
+/* What holds whenever set-points are sent. A state that breaks it commands nothing: the program ends, and the drives' watchdogs
+ * stop them. */
+static void assert_cycle(const sequencer_t *sequencer, const motion_t *motion)
+{
+    const state_t state = sequencer->supervisor.state;
+    const drive_control_t *drives = &sequencer->drive_control;
+    HV_ASSERT((unsigned)state < STATES && (unsigned)drives->bring_up <= BRING_UP_MOVE);
+    HV_ASSERT(state == STATE_ENGAGED || !motion_is_following(motion));
+    HV_ASSERT(state != STATE_ESTOP || drives->is_tracking);
+    HV_ASSERT(state != STATE_OFF || drives->is_tracking || drives->is_disable_due);
+}
+
 void gateway_cycle(gateway_t *self, uint64_t now_us)
 {
     const cycle_t cycle = cycle_of(self, now_us);
@@ -356,6 +368,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     if (drive_control_accepts_motion(&sequencer->drive_control)) {
         motion_step(&self->motion, now_us, &self->output);
     }
+    assert_cycle(sequencer, &self->motion);
     drive_control_send(&sequencer->drive_control, &cycle, &self->output);
     sequencer_after_motion(sequencer, &cycle);
     write_relays(self, &cycle);

@@ -197,7 +197,7 @@ HV_OWN_FRAME static void go_on_after_stop(motion_t *self, uint64_t now_us)
 
 hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
-    if (self->followed.phase == FOLLOW_NOBODY) {
+    if (!motion_is_following(self)) {
         return HV_OK;
     }
     if (!is_possible(self, target)) {
@@ -232,7 +232,7 @@ static void end_cycle(motion_t *self, uint64_t now_us)
     } else if (self->source == MOTION_ON_PATH && path_is_done(path) && motion_is_at_rest(self)) {
         self->source = MOTION_RESTING;
         platform_note_known_pose(&self->platform, path_end(path));
-        if (self->followed.phase != FOLLOW_NOBODY) {
+        if (motion_is_following(self)) {
             begin_following(self, now_us);
         }
     } else if (is_jogged && jog_is_done(&self->jog, &path->way.straight) && motion_is_at_rest(self)) {
@@ -310,7 +310,7 @@ HV_OWN_FRAME static void find_pose(platform_t *self, bool is_planned, motion_out
 /* What holds between two cycles. A state that breaks it moves nothing: the program ends, and the drives' watchdogs stop them. */
 static void assert_state(const motion_t *self)
 {
-    const bool is_followed = self->followed.phase != FOLLOW_NOBODY;
+    const bool is_followed = motion_is_following(self);
     HV_ASSERT((unsigned)self->source <= MOTION_PLANNED && (unsigned)self->next <= MOTION_THEN_FOLLOW &&
               (unsigned)self->followed.phase <= FOLLOW_FULLY && (unsigned)self->due <= DUE_TIMED);
     HV_ASSERT(is_followed || !follow_is_moving(self));
@@ -339,7 +339,7 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
         follow_step(self, now_us, ref, out);
     } else {
         step_in_cylinders(self, ref);
-        out->flags |= self->followed.phase != FOLLOW_NOBODY && self->source == MOTION_ON_PATH ? MOTION_TAKEOVER : 0;
+        out->flags |= motion_is_following(self) && self->source == MOTION_ON_PATH ? MOTION_TAKEOVER : 0;
         out->flags |= MOTION_IN_CYLINDERS;
         out->angle_deg_q32 = limit_angle(self, &ref[AXIS_ANGLE]);
     }
@@ -358,6 +358,11 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
 bool motion_is_at_rest(const motion_t *self)
 {
     return platform_is_at_rest(&self->platform);
+}
+
+bool motion_is_following(const motion_t *self)
+{
+    return self->followed.phase != FOLLOW_NOBODY;
 }
 
 bool motion_is_done(const motion_t *self)
