@@ -52,13 +52,15 @@ def backend():
 
 def circle():
     with tempfile.TemporaryDirectory() as folder:
-        objects = Path(folder) / "src/config/CMakeFiles/x.dir"
+        objects, sources = Path(folder) / "build/src/config/CMakeFiles/x.dir", Path(folder) / "src/config"
         objects.mkdir(parents=True)
+        sources.mkdir(parents=True)
         for name, code in {"a": "int b(void); int a(void) { return b(); }", "b": "int c(void); int b(void) { return c(); }",
-                           "c": "int a(void); int c(void) { return a(); }", "d": "int a(void); int d(void) { return a(); }"}.items():
-            (objects / f"{name}.c").write_text(code, encoding="utf-8")
-            subprocess.run(["cc", "-c", "-o", objects / f"{name}.c.o", objects / f"{name}.c"], check=True)
-        found = check_rooms.circles(check_rooms.references(Path(folder)))
+                           "c": "int a(void); int c(void) { return a(); }", "d": "int a(void); int d(void) { return a(); }", "z": "int c(void) { return 1; }"}.items():
+            (sources / f"{name}.c").write_text(code, encoding="utf-8")
+            subprocess.run(["cc", "-c", "-o", objects / f"{name}.c.o", sources / f"{name}.c"], check=True)
+        (sources / "z.c").unlink()  # its object is still there and defines c, too
+        found = check_rooms.circles(check_rooms.references(Path(folder) / "build", Path(folder) / "src"))
         assert found == [["config/a.c", "config/b.c", "config/c.c"]], found
 
 

@@ -401,6 +401,29 @@ static void test_timed_stream_of_repeated_values_stays_a_stream(void)
     }
 }
 
+/* The same where frames in a row are lost: the next one is a sample by its time, whether that is of the frames or of the values.
+ */
+static void test_timed_stream_of_repeated_values_goes_on_after_losses(void)
+{
+    for (unsigned i = 0; i < 4; i++) {
+        setUp();
+        const unsigned frame_ms = i % 2 == 0 ? 10 : 20, value_ms = 4 * frame_ms, time_ms = i < 2 ? frame_ms : value_ms;
+        unsigned streamed_ms = 0;
+        for (unsigned ms = 0; ms < 8000; ms++) {
+            const bool is_lost = ms >= 3000 && ms % 1000 < 4 * frame_ms;
+            if (ms % frame_ms == 0 && !is_lost) {
+                char text[64];
+                snprintf(text, sizeof text, "@A6T:0,0,0,0,0,%.3f,%u#", 15 * sin(0.005 * (ms / value_ms * value_ms)), time_ms);
+                rig_send(&m_rig, text);
+            }
+            rig_run_ms(&m_rig, 1);
+            streamed_ms += ms >= 2000 && m_rig.gateway.motion.source == MOTION_STREAMED ? 1u : 0u;
+        }
+        TEST_ASSERT_EQUAL_UINT(6000, streamed_ms);
+        check_kept();
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -418,5 +441,6 @@ int main(void)
     RUN_TEST(test_timed_frame_unlike_the_period_of_a_stream_is_a_move);
     RUN_TEST(test_stream_with_times_of_1_ms_is_one_without_also_where_a_frame_is_lost);
     RUN_TEST(test_timed_stream_of_repeated_values_stays_a_stream);
+    RUN_TEST(test_timed_stream_of_repeated_values_goes_on_after_losses);
     return UNITY_END();
 }
