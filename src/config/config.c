@@ -15,15 +15,12 @@
 
 #include "common/encoding.h"
 #include "common/translate.h"
-#include "config/check.h"
-#include "config/hash.h"
 #include "config/source.h"
 #include "config/startup.h"
 #include "config/startup_read.h"
 #include "config/value.h"
 
-#define WAIT_MS  5000 /* for who writes a pipe; once heaved runs, nobody is waited for */
-#define CONTINUE 1    /* inih: the handler took the pair */
+#define CONTINUE 1 /* inih: the handler took the pair */
 
 /* --- Lines --- */
 
@@ -367,7 +364,7 @@ static bool open_bytes(config_source_t *self, const config_text_source_t *from)
     return true;
 }
 
-void config_source_load(config_source_t *self, const config_text_source_t *from, config_t *config, FILE *errors)
+bool config_source_read(config_source_t *self, const config_text_source_t *from, config_t *config, FILE *errors)
 {
     HV_ASSERT(config_key_count <= CONFIG_KEYS_MAX && config_section_count <= CONFIG_SECTIONS_MAX);
     memset(config, 0, sizeof *config);
@@ -378,23 +375,9 @@ void config_source_load(config_source_t *self, const config_text_source_t *from,
     self->config = config;
     self->section = CONFIG_SECTION_NONE;
     if (!open_bytes(self, from)) {
-        return;
+        return false;
     }
     set_defaults(self);
     read_file(self);
-    if (!self->is_given_up) {
-        config_check(self);
-    }
-}
-
-int config_load(const char *path, config_t *out, FILE *errors)
-{
-    config_t config;
-    config_source_t self;
-    config_source_load(&self, &(config_text_source_t){.name = path, .wait_ms = WAIT_MS}, &config, errors);
-    if (self.error_count == 0) {
-        config_hash(&config);
-        memcpy(out, &config, sizeof config);
-    }
-    return self.error_count;
+    return !self->is_given_up;
 }

@@ -41,8 +41,9 @@ typedef struct {
     int wait_ms;      /**< for each piece of a pipe */
 } config_text_source_t;
 
-/** Loads into a configuration, whole or with errors. Allocates nothing. */
-void config_source_load(config_source_t *self, const config_text_source_t *from, config_t *config, FILE *errors);
+/** Reads into a configuration, with an error for each line that cannot be. Allocates nothing.
+ *  @return false: the file could not be read to its end */
+bool config_source_read(config_source_t *self, const config_text_source_t *from, config_t *config, FILE *errors);
 
 enum { CONFIG_SECTION_NONE = -1, CONFIG_SECTION_REFUSED = -2 };
 

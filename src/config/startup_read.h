@@ -6,11 +6,8 @@
 
 #include "config/source.h"
 
-/** Takes a line of the section that the reader is in, cut in two at its first = or :. */
+/** Reads a line of the section that the reader is in, cut in two at its first = or :. */
 void config_startup_parse(config_source_t *self, const char *before, const char *behind);
-
-/** Refuses items that heaved sets itself for this configuration. */
-void config_startup_check(config_source_t *self);
 
 /** Which lists of a file differ from those of a platform that runs, which keeps its own.
  *  @param report says it; NULL: nothing is said

@@ -10,6 +10,7 @@
 #include "common/json.h"
 #include "common/message.h"
 #include "config/config.h"
+#include "platform/load.h"
 #include "daemon/gpio_setup.h"
 #include "heave/gateway.h"
 #include "inspect/report.h"

@@ -5,10 +5,10 @@
 
 #include <time.h>
 
-#include "config/canraw_section.h"
-#include "config/cia402_section.h"
-#include "config/coils.h"
-#include "config/modbus_section.h"
+#include "platform/canraw_section.h"
+#include "platform/cia402_section.h"
+#include "platform/coils.h"
+#include "platform/modbus_section.h"
 #include "daemon/gpio_setup.h"
 
 #define LEAVE_NS      5000000          /* seven frames, even at 125 kbit/s */

@@ -19,6 +19,7 @@
 #include "common/translate.h"
 #include "common/usage.h"
 #include "config/config.h"
+#include "platform/load.h"
 #include "daemon/check_json.h"
 #include "daemon/gpio_setup.h"
 #include "daemon/live.h"

@@ -10,6 +10,7 @@
 #include "common/translate.h"
 #include "config/hash.h"
 #include "service/control_configuration.h"
+#include "platform/load.h"
 
 #define LINE_MOST  (HAL_LOG_TEXT_MAX - 16u) /* without the prefix of writers_say() */
 #define LINE_LEAST (LINE_MOST / 2u)

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "config/canraw_section.h"
+#include "platform/canraw_section.h"
 
 #define FRAMES_MAX   (8u + CANRAW_STEPS_MAX)
 #define PREFIX_MAX   4u

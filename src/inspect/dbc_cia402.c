@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * dbc_cia402.c - the PDOs of [cia402] as a DBC file; see dbc.h.
  */
-#include "config/cia402_section.h"
+#include "platform/cia402_section.h"
 #include "inspect/dbc.h"
 
 #define COB_EMCY 0x080u

@@ -8,7 +8,7 @@
 
 #include "common/translate.h"
 #include "config/config.h"
-#include "config/startup_denied.h"
+#include "platform/startup_denied.h"
 
 #define FAMILY "cia402-startup"
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "common/translate.h"
-#include "config/cia402_section.h"
+#include "platform/cia402_section.h"
 #include "inspect/doctor_report.h"
 
 #define FINDINGS_MAX  128u

@@ -7,7 +7,7 @@
 
 #include <stdio.h>
 
-#include "config/envelope.h"
+#include "platform/envelope.h"
 
 /** Writes the header and all rows. Errors are left in the stream. */
 void envelope_csv_write(const envelope_t *envelope, FILE *out);

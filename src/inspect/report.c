@@ -10,16 +10,16 @@
 
 #include "common/columns.h"
 #include "common/translate.h"
-#include "config/bus.h"
-#include "config/cia402_section.h" // config_cia402_pp_lag_q32
+#include "platform/bus.h"
+#include "platform/cia402_section.h" // config_cia402_pp_lag_q32
 #include "config/hash.h"
 #include "config/keys.h"
-#include "config/layout.h"
-#include "config/modbus_section.h"
-#include "config/scaling.h"
+#include "platform/layout.h"
+#include "platform/modbus_section.h"
+#include "platform/scaling.h"
 #include "config/config_text.h"
 #include "heave/ramp.h"
-#include "config/envelope.h"
+#include "platform/envelope.h"
 
 #define EDGE_TOLERANCE 0.001 /* deg or mm: a limit on the edge itself is fine */
 #define DIAGONALS      4u    /* of a pair: both axes as far as each other, in every combination of senses */

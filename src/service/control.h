@@ -17,6 +17,7 @@
 #include "service/handover.h"
 #include "service/operator_log.h"
 #include "service/status_json.h"
+#include "platform/load.h"
 
 #define CONTROL_CLIENTS      8u
 #define CONTROL_SOCKETS      2u

@@ -9,6 +9,7 @@
 
 #include "common/translate.h"
 #include "service/control_client.h"
+#include "platform/load.h"
 
 #define WRITE_US 10000000u
 

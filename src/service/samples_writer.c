@@ -12,7 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "config/telemetry_section.h"
+#include "platform/telemetry_section.h"
 
 #define HEADER_BYTES 8192u
 #define NO_FRAME     UINT32_MAX

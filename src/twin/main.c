@@ -11,14 +11,15 @@
 #include <unistd.h>
 
 #include "common/message.h" // exit codes
-#include "config/canraw_section.h"
-#include "config/cia402_section.h"
-#include "config/modbus_section.h"
+#include "platform/canraw_section.h"
+#include "platform/cia402_section.h"
+#include "platform/modbus_section.h"
 #include "twin/twin_control.h"
 #include "twin/modbus_ports.h"
 #include "twin/twin_options.h"
 #include "twin/script.h"
 #include "twin/wire.h"
+#include "platform/load.h"
 
 #define FDS_MAX        (WIRE_FDS_MAX + CONTROL_FDS_MAX + MODBUS_PORTS_FDS_MAX)
 #define PRIORITY       40    /* heaved has 80, interrupts 50 */

@@ -12,7 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "config/modbus_section.h"
+#include "platform/modbus_section.h"
 #include "twin/pty.h"
 
 #define HEAD_TCP 7u /* transaction, protocol, length, unit */

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "config/modbus_section.h"
+#include "platform/modbus_section.h"
 
 #define VALUES_MAX  125u
 #define COIL_ON     0xFF00u

@@ -6,9 +6,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "config/canraw_section.h"
-#include "config/cia402_section.h"
-#include "config/modbus_section.h"
+#include "platform/canraw_section.h"
+#include "platform/cia402_section.h"
+#include "platform/modbus_section.h"
 
 #define OTHER_US             20000u /* from one frame of another master to the next */
 #define CIA402_RPDO          0x200u

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "config/config.h"
+#include "platform/load.h"
 #include "record/frames.h"
 #include "daemon/devices.h"
 #include "table.h"

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "config/config.h"
+#include "platform/load.h"
 #include "fuzz.h"
 #include "heave/gateway.h"
 #include "sim_drives.h"

@@ -10,6 +10,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "platform/load.h"
 #include "fuzz.h"
 #include "record/service_words.h"
 #include "service/control.h"

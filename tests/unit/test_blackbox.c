@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "platform/load.h"
 #include "config/hash.h"
 #include "daemon/motion_loop.h"
 #include "daemon/play.h"

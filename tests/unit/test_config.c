@@ -6,6 +6,7 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "config/config.h"
+#include "platform/load.h"
 #include "config/hash.h"
 #include "config/keys.h"
 #include "config/config_text.h"

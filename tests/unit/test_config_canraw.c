@@ -8,9 +8,10 @@
 #include <string.h>
 
 #include "canraw_slave.h"
-#include "config/bus.h"
-#include "config/canraw_section.h"
+#include "platform/bus.h"
+#include "platform/canraw_section.h"
 #include "config/config.h"
+#include "platform/load.h"
 #include "config/value.h"
 #include "unity.h"
 

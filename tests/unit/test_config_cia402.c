@@ -7,9 +7,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config/bus.h"
-#include "config/cia402_section.h"
+#include "platform/bus.h"
+#include "platform/cia402_section.h"
 #include "config/config.h"
+#include "platform/load.h"
 #include "config/value.h"
 #include "cia402_slave.h"
 #include "inspect/report.h"

@@ -4,7 +4,8 @@
  */
 #define _POSIX_C_SOURCE 200809L
 
-#include "config/modbus_section.h"
+#include "platform/load.h"
+#include "platform/modbus_section.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -8,6 +8,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "platform/load.h"
 #include "service/control.h"
 #include "unity.h"
 

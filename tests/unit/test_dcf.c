@@ -8,8 +8,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config/cia402_section.h"
+#include "platform/cia402_section.h"
 #include "config/config.h"
+#include "platform/load.h"
 #include "inspect/dcf_startup.h"
 #include "unity.h"
 

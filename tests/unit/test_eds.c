@@ -7,8 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config/cia402_section.h"
+#include "platform/cia402_section.h"
 #include "config/config.h"
+#include "platform/load.h"
 #include "inspect/eds_judge.h"
 #include "unity.h"
 

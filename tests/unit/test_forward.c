@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "config/config.h"
+#include "platform/load.h"
 #include "unity.h"
 
 #define ERROR_MM_Q32  (Q32_ONE / 1000)

@@ -4,13 +4,14 @@
  */
 #define _POSIX_C_SOURCE 200809L
 
-#include "config/layout.h"
+#include "platform/layout.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "config/config.h"
+#include "platform/load.h"
 #include "heave/number.h"
 #include "unity.h"
 

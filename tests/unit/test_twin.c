@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "platform/load.h"
 #include "twin/script.h"
 
 #include <math.h>
@@ -7,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "config/startup_denied.h"
+#include "platform/startup_denied.h"
 #include "heave/status.h"
 #include "linux_can_local.h"
 #include "twin/twin_options.h"

@@ -2,6 +2,7 @@
  * test_twin_lines.c - which GPIO lines heave-twin makes of a configuration, where, and which faults they have. What is on them:
  * tests/system/test_twin_gpio.py.
  */
+#include "platform/load.h"
 #include "twin/lines.h"
 
 #include <stdlib.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "platform/load.h"
 #include "twin/modbus_side.h"
 
 #include <stdio.h>

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 
 #include "config/config.h"
+#include "platform/load.h"
 #include "unity.h"
 
 #define LSB 4294967296.0
