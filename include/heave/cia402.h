@@ -340,7 +340,7 @@ typedef struct {
     bool is_open;          /* SYNC has gone out, the set-points have not */
     bool was_period_begin; /* in the last poll */
     bool is_free;          /* all frames sent were seen on the wire */
-    bool is_refused;       /* the queue was full for the last SYNC or a part of the last set */
+    bool is_refused;       /* the bus did not accept the last SYNC, or some of the last set-points: its queue was full */
     bool has_time;
     bool is_preop_due; /* NMT pre-operational has to be sent to all nodes */
     canpassive_t passive;

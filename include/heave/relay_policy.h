@@ -10,7 +10,7 @@
 /** The relays of a platform; members are private to relay_policy.c. All zero is a valid start: every relay open. */
 typedef struct {
     uint16_t mask;        /**< as last allowed */
-    uint16_t changed;     /**< bits whose changed_us is valid */
+    uint16_t changed;     /**< relays that have changed since the start; only their changed_us is valid */
     uint16_t cut;         /**< relays that were opened after max_on_ms and that the sender has not opened since */
     uint16_t delayed;     /**< relays that wait for min_toggle_ms */
     uint32_t cut_count;   /**< relays opened because of max_on_ms; wraps */

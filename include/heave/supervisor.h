@@ -48,7 +48,7 @@ typedef enum {
     EVENTS
 } event_t;
 
-/** What the gateway must do on entering the new state. */
+/** What the gateway must do on entering the new state. Each state that is entered has one action, whatever led to it. */
 typedef enum {
     ACTION_NONE,
     ACTION_HOME,       /**< enable and home the drives, then move to the settled extension */

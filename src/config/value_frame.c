@@ -145,7 +145,7 @@ static const char *judge_place(const canraw_frame_t *frame, const canraw_field_t
     uint8_t used[CANRAW_BYTES_MAX] = {0};
     uint8_t own[CANRAW_BYTES_MAX] = {0};
     if (field->at + canraw_field_span(field) > frame->length) {
-        return _("lies on bytes that are not there; write them before it, 00 for those that carry nothing else");
+        return _("covers bytes beyond the frame; write them before the field, as 00 where they carry nothing else");
     }
     for (unsigned i = 0; i < frame->fields; i++) {
         (void)canraw_field_cover(&frame->field[i], used);

@@ -9,12 +9,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/** A hold delays the end by so long; */
-#define DELAYED_END_HOLD_US 10000000u
-/** all holds together by so long. */
+/** The longest delay of the end by one hold, and by all holds together. */
+#define DELAYED_END_HOLD_US  10000000u
 #define DELAYED_END_HOLDS_US 60000000u
 
-/** Zeroed: no end has been asked for. Private. */
+/** Starts with all members zero: no end has been asked for. Members are private. */
 typedef struct {
     bool is_asked;        /**< by a signal, or the request `shutdown`; the owner may set it */
     uint64_t step_us;     /**< time of the newest step */

@@ -6,8 +6,8 @@
 
 #include "common/socket_path.h"
 
-/** The socket to use where none is named: that of a heaved started by hand, else the only one of a service, else the first again,
- * at which then nobody listens.
+/** Finds the socket to use where none is named. The first of these that exists: that of a heaved started by hand, that of the
+ * only service. If nothing runs, it is the path of the first one.
  *  @param directory SOCKET_DIRECTORY, another short one in tests
  *  @param platforms gets the names of all services where there are several, separated by `, `; else empty
  *  @return false where there are several: path is empty */

@@ -33,7 +33,7 @@ const char *doctor_probe_trouble(const doctor_probe_t *self);
 /** What became of what was sent so far. */
 const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self);
 
-/** Listens without a word. */
+/** Reads the bus for so many ms and sends nothing. */
 void doctor_probe_listen(doctor_probe_t *self, unsigned ms);
 
 /** Reads a CiA 402 drive. */

@@ -169,7 +169,7 @@ static q32_t fastest(const ramp_state_t *start, const sync_stop_times_t *t)
 {
     const q32_t acc_q32 = start->acc_per_cycle2_q32;
     const q32_t fall_q32 = fx_abs(acc_q32 + push_of(start, t) / divisor_of(t));
-    const bool is_speeding_up = (start->vel_per_cycle_q32 > 0) == (acc_q32 > 0);
+    const bool is_speeding_up = fall_q32 != 0 && (start->vel_per_cycle_q32 > 0) == (acc_q32 > 0); /* 0: it rests */
     const q32_t gain_q32 = is_speeding_up ? fx_mul_div(fx_mul_div(acc_q32, t->change, 2), fx_abs(acc_q32), fall_q32) : 0;
     return fx_abs(fx_add_sat(start->vel_per_cycle_q32, gain_q32));
 }

@@ -149,7 +149,7 @@ static bool put_block(viewer_t *viewer, feed_t *stream, const double *value, uin
     for (unsigned c = 0; c < stream->columns; c++) {
         memcpy(block + HEAD_BYTES + sizeof(double) * rows * c, &value[ROWS_MAX * c], sizeof(double) * rows);
     }
-    if (!viewer_put(viewer, block, HEAD_BYTES + sizeof(double) * rows * stream->columns, true)) {
+    if (!outbox_put(viewer, block, HEAD_BYTES + sizeof(double) * rows * stream->columns, true)) {
         stream->dropped += rows;
         return false;
     }

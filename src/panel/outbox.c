@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool viewer_put(viewer_t *viewer, const void *data, size_t length, bool is_binary)
+bool outbox_put(viewer_t *viewer, const void *data, size_t length, bool is_binary)
 {
     if (viewer->count == VIEWER_QUEUE) {
         return false;
@@ -21,7 +21,7 @@ bool viewer_put(viewer_t *viewer, const void *data, size_t length, bool is_binar
     return true;
 }
 
-bool viewer_pop(viewer_t *viewer, message_t *out)
+bool outbox_pop(viewer_t *viewer, message_t *out)
 {
     if (viewer->count == 0) {
         return false;

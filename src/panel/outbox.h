@@ -9,9 +9,9 @@
 #define OUTBOX_HEAD 32u /* bytes before a message's data, for the library's head */
 
 /** Queues a message. @return false: the queue is full, or there is no memory */
-bool viewer_put(viewer_t *viewer, const void *data, size_t length, bool is_binary);
+bool outbox_put(viewer_t *viewer, const void *data, size_t length, bool is_binary);
 
 /** The next message to send; false where there is none. The caller frees its data. */
-bool viewer_pop(viewer_t *viewer, message_t *out);
+bool outbox_pop(viewer_t *viewer, message_t *out);
 
 #endif

@@ -131,7 +131,7 @@ static int talk(struct lws *wsi, viewer_t *viewer)
     if (viewer->is_over) {
         return -1;
     }
-    if (!viewer_pop(viewer, &message)) {
+    if (!outbox_pop(viewer, &message)) {
         return 0;
     }
     const int sent =

@@ -84,7 +84,7 @@ void viewer_leave(viewers_t *viewers, viewer_t *viewer)
             send_controls(viewers, &viewers->platform[i]);
         }
     }
-    while (viewer_pop(viewer, &message)) {
+    while (outbox_pop(viewer, &message)) {
         free(message.data);
     }
     free(viewer);

@@ -16,7 +16,7 @@
 /* What may not be lost: a page that does not take it is closed, and comes again. */
 static void send(viewers_t *viewers, viewer_t *viewer, const char *text, size_t length)
 {
-    viewer->is_over = viewer->is_over || !viewer_put(viewer, text, length, false);
+    viewer->is_over = viewer->is_over || !outbox_put(viewer, text, length, false);
     viewers->wake(viewer);
 }
 

@@ -78,10 +78,10 @@ void node_enter(node_t *self, uint8_t nmt);
 /** Tells an error, without becoming faulty. */
 void node_emergency(node_t *self, uint16_t code, uint8_t error_register);
 
-/** A frame on the bus. */
+/** Reads a frame that another node has sent. */
 void node_hear(node_t *self, const can_frame_t *frame, uint64_t now_us);
 
-/** Lives up to now. */
+/** Advances to this time. */
 void node_advance(node_t *self, uint64_t now_us);
 
 /** When it wants to be looked at next. */

@@ -252,6 +252,21 @@ static void test_the_fault_of_one_has_its_own_code(void)
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_feedback[1].state);
 }
 
+static void test_a_fault_may_be_any_bit_of_the_status(void)
+{
+    for (unsigned bit = 0; bit < 8; bit++) {
+        setUp();
+        m_map.enabled_when = (canraw_when_t){0, 0};
+        m_map.fault_when = (canraw_when_t){1u << bit, 1u << bit};
+        open_driver();
+        cycles(30);
+        TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_feedback[0].state);
+        m_status[0] = (uint8_t)(1u << bit);
+        cycles(12);
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, m_feedback[0].state);
+    }
+}
+
 /* A warning: told, and nothing stops. */
 static void test_a_code_without_a_fault_is_told(void)
 {
@@ -356,6 +371,7 @@ int main(void)
     RUN_TEST(test_a_status_that_fails_while_positions_come_is_a_drive_that_is_gone);
     RUN_TEST(test_a_drive_without_a_status_is_stopped_with_the_others);
     RUN_TEST(test_the_fault_of_one_has_its_own_code);
+    RUN_TEST(test_a_fault_may_be_any_bit_of_the_status);
     RUN_TEST(test_a_code_without_a_fault_is_told);
     RUN_TEST(test_torque_is_told_in_the_direction_of_the_extension);
     RUN_TEST(test_what_is_not_believed_is_named);

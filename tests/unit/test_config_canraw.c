@@ -233,7 +233,7 @@ static const spoilt_t k_spoilt[] = {
     {"setpoint", "setpoint = 01 {position:u8le}", "\"{position:u8le}\" has an order of bytes, but only one byte; allowed: "},
     {"setpoint", "setpoint = 00 {position:u4@0.8}", "\"{position:u4@0.8}\" has no place that there is, such as @1.4 for byte 1"},
     {"setpoint", "setpoint = 00 {position:u4@8.0}", "\"{position:u4@8.0}\" has no place that there is, such as @1.4 for byte 1"},
-    {"setpoint", "setpoint = 01 {position:u20le@1.0}", "\"{position:u20le@1.0}\" lies on bytes that are not there; write them"},
+    {"setpoint", "setpoint = 01 {position:u20le@1.0}", "\"{position:u20le@1.0}\" covers bytes beyond the frame; write them"},
     {"setpoint", "setpoint = 01 {position:i32le} {speed:u4@4.0}", "\"{speed:u4@4.0}\" lies on bits of another field; allowed"},
     {"setpoint", "setpoint = 01 {position:u7@0.0}", "\"{position:u7@0.0}\" lies on bits that are 1; write 0 for them; allowed"},
     {"setpoint", "setpoint = 01 {position:f32le/0}", "\"{position:f32le/0}\" has no type that there is; allowed: "},
@@ -269,7 +269,7 @@ static const spoilt_t k_spoilt[] = {
     {"setpoint_id", "setpoint_id = 0x201, 0x201, 0x202, 0x203, 0x204, 0x205",
      "0x201 of drive 2 is setpoint_id of drive 1 already; allowed: a different one for each, or fields such as "
      "{position.2:i16le} in setpoint"},
-    {"setpoint", "setpoint = {position.1:u20le@0.0}", "\"{position.1:u20le@0.0}\" lies on bytes that are not there; "},
+    {"setpoint", "setpoint = {position.1:u20le@0.0}", "\"{position.1:u20le@0.0}\" covers bytes beyond the frame; "},
     {"setpoint", "setpoint = {position.8:u24le}", "\"{position.8:u24le}\" has no number of a drive from 1 to 7 behind its point"},
     {"setpoint", "setpoint = {position.:u24le}", "\"{position.:u24le}\" has no number of a drive from 1 to 7 behind its point"},
     {"setpoint", "setpoint = {position.1:u24le} {position:u24le}", "\"{position:u24le}\" is there twice; allowed: "},
