@@ -109,7 +109,7 @@ static bool is_coarse(const stream_t *self)
 
 static void note_sample(stream_t *self, unsigned periods, q32_t shift_q32, const q32_t *sample_q32)
 {
-    const q32_t late_q32 = self->clock.period_us_q16 > 0 ? stream_clock_lateness(&self->clock) : 0;
+    const q32_t late_q32 = stream_clock_lateness(&self->clock); /* 0 while no period is known */
     stream_evidence_add(&self->evidence, &self->curve.governor, self->curve.axes, periods, late_q32, shift_q32, is_coarse(self),
                         sample_q32);
 }
