@@ -40,10 +40,10 @@ typedef struct {
 /** References of the next cycle, of the axes that follow the path. */
 void path_step(path_t *self, ramp_ref_t ref[AXES_MAX]);
 
-/** True when the references have come to rest at the end. */
+/** True when the references have come to rest at the end. Not of a quintic. */
 bool path_is_done(const path_t *self);
 
-/** Where the axes rest at the end. */
+/** Where the axes rest at the end. Not of a stop, which has stop.rest_q32. */
 const q32_t *path_end(const path_t *self);
 
 /** True while a straight line moves at one speed. */

@@ -53,24 +53,13 @@ void path_step(path_t *self, ramp_ref_t ref[AXES_MAX])
 
 bool path_is_done(const path_t *self)
 {
-    switch (self->kind) {
-    case PATH_STOP:
-        return sync_stop_is_done(&self->stop);
-    case PATH_STRAIGHT:
-        return scurve_is_done(&self->way.straight.curve);
-    case PATH_STOP_AND_STRAIGHT:
-        return sync_stop_is_done(&self->stop) && scurve_is_done(&self->way.straight.curve);
-    case PATH_QUINTIC:
-        break;
-    }
-    return quintic_is_done(&self->way.quintic);
+    return (self->kind == PATH_STRAIGHT || sync_stop_is_done(&self->stop)) &&
+           (self->kind == PATH_STOP || scurve_is_done(&self->way.straight.curve));
 }
 
 const q32_t *path_end(const path_t *self)
 {
-    return self->kind == PATH_STOP      ? self->stop.rest_q32
-           : self->kind == PATH_QUINTIC ? self->way.quintic.target_q32
-                                        : self->way.straight.to_q32;
+    return self->kind == PATH_QUINTIC ? self->way.quintic.target_q32 : self->way.straight.to_q32;
 }
 
 bool path_is_cruising(const path_t *self)

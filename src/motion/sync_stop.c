@@ -164,12 +164,13 @@ static q32_t rest_of(const ramp_state_t *start, const sync_stop_times_t *t)
     return fx_clamp(fx_add_sat(start->pos_q32, distance(start, t)), -FURTHEST_Q32, FURTHEST_Q32);
 }
 
-/* Fastest an axis gets while its acceleration is taken back: v + a^2 / 2 over the slope of the change. */
+/* Fastest an axis gets while its acceleration is taken back: v + a^2 / 2 over the slope of the change. Without a change it is
+ * beyond every limit (fx_mul_div saturates), and the axis gets times of its own: one at rest none. */
 static q32_t fastest(const ramp_state_t *start, const sync_stop_times_t *t)
 {
     const q32_t acc_q32 = start->acc_per_cycle2_q32;
     const q32_t fall_q32 = fx_abs(acc_q32 + push_of(start, t) / divisor_of(t));
-    const bool is_speeding_up = fall_q32 != 0 && (start->vel_per_cycle_q32 > 0) == (acc_q32 > 0); /* 0: it rests */
+    const bool is_speeding_up = (start->vel_per_cycle_q32 > 0) == (acc_q32 > 0);
     const q32_t gain_q32 = is_speeding_up ? fx_mul_div(fx_mul_div(acc_q32, t->change, 2), fx_abs(acc_q32), fall_q32) : 0;
     return fx_abs(fx_add_sat(start->vel_per_cycle_q32, gain_q32));
 }
