@@ -311,7 +311,7 @@ typedef struct {
     bool is_homed;
     bool has_sent;
     bool was_faulty;
-    uint8_t live_syncs; /* SYNCs in which the last controlword that leads to power or torque may not have shown yet */
+    uint8_t live_answers; /* in which the last controlword that leads to power or torque may not show yet */
 } cia402_axis_t;
 
 /** Common stage of all drives; private. */

@@ -16,6 +16,7 @@
 #define FOLLOWS_US         500000u  /* a drive in its mode that does not set bit 12 is believed after this */
 #define PLAIN_SYNCS        50u      /* after these, answers that nobody asked for are forgotten */
 #define BOOTS_APART_US     10000u   /* no drive starts twice in so short a time */
+#define LIVE_ANSWERS       3u /* to the SYNC before a set, to the one at which it acts, and to the next one, which shows it */
 #define NMT_STATE_BOOT     0x00u
 #define NMT_TOGGLE         0x80u
 
@@ -134,6 +135,7 @@ void cia402_axis_note_answer(cia402_drive_t drive, unsigned n, uint8_t all)
     if (self->answered == all) {
         self->answered = 0;
         self->silent_syncs = 0;
+        self->live_answers = self->live_answers > 0 ? (uint8_t)(self->live_answers - 1u) : 0;
         self->has_answer = true;
         self->has_answered = true;
     }
@@ -173,6 +175,7 @@ static void receive_boot(cia402_drive_t drive)
     self->mute_object = 0;
     self->is_reset_done = true; /* it has just begun anew */
     self->statusword = 0;       /* without torque */
+    self->live_answers = 0;
     self->emergency.is_over = true;
     cia402_axis_look_for(drive);
     if (is_twice) {
@@ -404,17 +407,16 @@ void cia402_axis_next_word(cia402_drive_t drive, uint16_t mode_bits)
     cia402_axis_t *self = drive.axis;
     choose_word(drive, mode_bits);
     if ((self->word & CIA402_WORD_SWITCH_ON) != 0) {
-        self->live_syncs = word_syncs_min(drive);
-    } else if (self->live_syncs > 0) {
-        self->live_syncs--;
+        self->live_answers = LIVE_ANSWERS;
     }
 }
 
-/* What leads up acts at the next SYNC and shows at the one after: until then the statusword is of what was before. */
+/* Until it shows what a command that leads up has done, the statusword is of what was before. Only answers that have come count.
+ */
 bool cia402_axis_is_energized(const cia402_axis_t *self)
 {
     const cia402_state_t state = cia402_axis_state(self);
-    return cia402_has_torque(state) || state == CIA402_SWITCHED_ON || self->live_syncs > 0;
+    return cia402_has_torque(state) || state == CIA402_SWITCHED_ON || self->live_answers > 0;
 }
 
 bool cia402_axis_is_operating(cia402_drive_t drive)

@@ -22,7 +22,6 @@ void cia402_axis_look_for(cia402_drive_t drive)
     self->answered = 0;
     self->goal = CIA402_GOAL_OFF;
     self->word = 0;
-    self->live_syncs = 0;
     sdo_cancel(&self->sdo);
     if (drive.own->channel == 0) {
         sdo_read(&self->sdo, 0x1000, 0, 1);
