@@ -55,9 +55,12 @@ static int32_t signed_of(const drive_t *self, uint16_t index, uint8_t sub)
     return (int32_t)objects_get(&self->od, index, sub);
 }
 
+/* Positions wrap round: of all that have these counts, the one that is nearest. */
 static double target_of(const drive_t *self)
 {
-    return signed_of(self, self->mode == MODE_IP ? 0x60C1 : 0x607A, self->mode == MODE_IP ? 1 : 0) + self->origin;
+    const uint32_t counts = objects_get(&self->od, self->mode == MODE_IP ? 0x60C1 : 0x607A, self->mode == MODE_IP ? 1 : 0);
+    const int64_t actual = llround(self->motor.actual - self->origin);
+    return (double)(actual + (int32_t)(counts - (uint32_t)actual)) + self->origin;
 }
 
 /* --- What it shows --- */

@@ -131,6 +131,9 @@ static void start_axis(node_t *self, uint64_t now_us)
     const objects_t before = self->drive.od;
     self->now_us = now_us;
     objects_start(&self->drive.od, self->number, self->identity, self->head == NULL);
+    for (unsigned i = 0; i < self->owns; i++) {
+        objects_add(&self->drive.od, self->own[i]);
+    }
     put_maps(self, 0x1600, &self->commands);
     put_maps(self, 0x1A00, &self->answers);
     keep_defects(&self->drive.od, &before);

@@ -43,6 +43,8 @@ typedef struct node {
     cia402_maps_t commands;         /**< in its PDOs from the factory; none: as every drive has them */
     cia402_maps_t answers;
     bool are_maps_fixed;
+    const object_t *own; /**< objects of the maker, beside those that every drive has */
+    uint8_t owns;
 
     drive_t drive;
     node_out_t out;

@@ -4,6 +4,7 @@
 #include "twin/objects.h"
 
 #include <stddef.h>
+#include <string.h>
 
 #define INVALID  0x80000000u
 #define NO_RTR   0x40000000u
@@ -34,10 +35,20 @@ static const object_t k_rows[] = {
 /* Of homing, most used first. */
 static const uint8_t k_methods[] = {35, 37, 17, 18, 19, 20, 21, 22, 1, 2, 7, 11, 23, 27, 33, 34};
 
-static void add(objects_t *self, object_t row)
+static unsigned place_of(uint16_t index, uint8_t sub)
 {
+    return (index * 37u + sub) % OBJECT_PLACES;
+}
+
+void objects_add(objects_t *self, object_t row)
+{
+    unsigned place = place_of(row.index, row.sub);
+    while (self->place[place] != 0) {
+        place = (place + 1u) % OBJECT_PLACES;
+    }
     row.value = row.fallback;
     self->row[self->count++] = row;
+    self->place[place] = (uint8_t)self->count;
 }
 
 /* As many drives come: valid and event-driven, until somebody configures them. */
@@ -48,21 +59,21 @@ static void add_pdos(objects_t *self, uint8_t node, bool is_first)
     for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
         const uint32_t off = n < 2 && is_first ? 0 : INVALID;
         const uint32_t step = 0x100u * n + node;
-        add(self, (object_t)RO((uint16_t)(0x1400 + n), 0, 1, 2));
-        add(self, (object_t)RW((uint16_t)(0x1400 + n), 1, 4, (0x200 + step) | off));
-        add(self, (object_t)RW((uint16_t)(0x1400 + n), 2, 1, EVENT));
-        add(self, (object_t)RO((uint16_t)(0x1800 + n), 0, 1, 6));
-        add(self, (object_t)RW((uint16_t)(0x1800 + n), 1, 4, (0x180 + step) | off | NO_RTR));
-        add(self, (object_t)RW((uint16_t)(0x1800 + n), 2, 1, EVENT));
-        add(self, (object_t)RW((uint16_t)(0x1800 + n), 3, 2, 0));
-        add(self, (object_t)RW((uint16_t)(0x1800 + n), 5, 2, 0));
-        add(self, (object_t)RW((uint16_t)(0x1800 + n), 6, 1, 0));
-        add(self, (object_t)RW((uint16_t)(0x1600 + n), 0, 1, n < 2 ? n + 1u : 0u));
-        add(self, (object_t)RW((uint16_t)(0x1A00 + n), 0, 1, n < 2 ? n + 1u : 0u));
+        objects_add(self, (object_t)RO((uint16_t)(0x1400 + n), 0, 1, 2));
+        objects_add(self, (object_t)RW((uint16_t)(0x1400 + n), 1, 4, (0x200 + step) | off));
+        objects_add(self, (object_t)RW((uint16_t)(0x1400 + n), 2, 1, EVENT));
+        objects_add(self, (object_t)RO((uint16_t)(0x1800 + n), 0, 1, 6));
+        objects_add(self, (object_t)RW((uint16_t)(0x1800 + n), 1, 4, (0x180 + step) | off | NO_RTR));
+        objects_add(self, (object_t)RW((uint16_t)(0x1800 + n), 2, 1, EVENT));
+        objects_add(self, (object_t)RW((uint16_t)(0x1800 + n), 3, 2, 0));
+        objects_add(self, (object_t)RW((uint16_t)(0x1800 + n), 5, 2, 0));
+        objects_add(self, (object_t)RW((uint16_t)(0x1800 + n), 6, 1, 0));
+        objects_add(self, (object_t)RW((uint16_t)(0x1600 + n), 0, 1, n < 2 ? n + 1u : 0u));
+        objects_add(self, (object_t)RW((uint16_t)(0x1A00 + n), 0, 1, n < 2 ? n + 1u : 0u));
         for (uint8_t k = 0; k < 8; k++) {
             const bool is_mapped = n < 2 && k < 2;
-            add(self, (object_t)RW((uint16_t)(0x1600 + n), (uint8_t)(k + 1), 4, is_mapped ? k_received[n][k] : 0));
-            add(self, (object_t)RW((uint16_t)(0x1A00 + n), (uint8_t)(k + 1), 4, is_mapped ? k_sent[n][k] : 0));
+            objects_add(self, (object_t)RW((uint16_t)(0x1600 + n), (uint8_t)(k + 1), 4, is_mapped ? k_received[n][k] : 0));
+            objects_add(self, (object_t)RW((uint16_t)(0x1A00 + n), (uint8_t)(k + 1), 4, is_mapped ? k_sent[n][k] : 0));
         }
     }
 }
@@ -70,16 +81,17 @@ static void add_pdos(objects_t *self, uint8_t node, bool is_first)
 void objects_start(objects_t *self, uint8_t node, const uint32_t identity[4], bool is_first)
 {
     self->count = 0;
+    memset(self->place, 0, sizeof self->place);
     for (uint32_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
-        add(self, k_rows[i]);
+        objects_add(self, k_rows[i]);
     }
-    add(self, (object_t)RO(0x60E3, 0, 1, sizeof k_methods));
+    objects_add(self, (object_t)RO(0x60E3, 0, 1, sizeof k_methods));
     for (uint32_t i = 0; i < sizeof k_methods; i++) {
-        add(self, (object_t)RO(0x60E3, (uint8_t)(i + 1), 1, k_methods[i]));
+        objects_add(self, (object_t)RO(0x60E3, (uint8_t)(i + 1), 1, k_methods[i]));
     }
-    add(self, (object_t)RO(0x1014, 0, 4, 0x80u + node));
+    objects_add(self, (object_t)RO(0x1014, 0, 4, 0x80u + node));
     for (uint8_t sub = 1; sub <= 4; sub++) {
-        add(self, (object_t)RO(0x1018, sub, 4, identity[sub - 1]));
+        objects_add(self, (object_t)RO(0x1018, sub, 4, identity[sub - 1]));
     }
     add_pdos(self, node, is_first);
 }
@@ -107,9 +119,10 @@ void objects_map(objects_t *self, uint16_t mapping, const uint32_t *entry, uint8
 
 static const object_t *find(const objects_t *self, uint16_t index, uint8_t sub)
 {
-    for (uint32_t i = 0; i < self->count; i++) {
-        if (self->row[i].index == index && self->row[i].sub == sub) {
-            return &self->row[i];
+    for (unsigned place = place_of(index, sub); self->place[place] != 0; place = (place + 1u) % OBJECT_PLACES) {
+        const object_t *row = &self->row[self->place[place] - 1u];
+        if (row->index == index && row->sub == sub) {
+            return row;
         }
     }
     return NULL;
@@ -130,7 +143,7 @@ uint32_t objects_get(const objects_t *self, uint16_t index, uint8_t sub)
 void objects_put(objects_t *self, uint16_t index, uint8_t sub, uint32_t value)
 {
     object_t *found = objects_find(self, index, sub);
-    if (found != NULL) {
+    if (found != NULL && !found->is_forced) {
         found->value = value;
     }
 }

@@ -8,9 +8,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define OBJECTS_MAX 240u
-#define OBJECT_PDOS 4u
-#define OBJECT_AXES 4u
+#define OBJECTS_MAX   240u
+#define OBJECT_PLACES 512u /* a power of two above it */
+#define OBJECT_PDOS   4u
+#define OBJECT_AXES   4u
 
 /** SDO abort codes. */
 enum {
@@ -48,6 +49,7 @@ typedef struct {
 typedef struct objects {
     uint32_t count;
     object_t row[OBJECTS_MAX];
+    uint8_t place[OBJECT_PLACES];      /**< where to look for a row: its number from 1; 0 = nothing */
     struct objects *axis[OBJECT_AXES]; /**< of the node: what a PDO may have in it; NULL = there is none */
 } objects_t;
 
@@ -55,6 +57,9 @@ typedef struct objects {
  *  @param identity 1018h, sub 1 to 4
  *  @param is_first the first axis of its node, whose PDOs have identifiers by themselves */
 void objects_start(objects_t *self, uint8_t node, const uint32_t identity[4], bool is_first);
+
+/** One more, of the maker. Its value is the one after a reset. */
+void objects_add(objects_t *self, object_t row);
 
 /** What a PDO has in it from the factory.
  *  @param mapping  1600h to 1603h, 1A00h to 1A03h
@@ -71,7 +76,7 @@ void objects_reset(objects_t *self);
 /** NULL where there is none. */
 object_t *objects_find(objects_t *self, uint16_t index, uint8_t sub);
 
-/** Of an object that every drive has. */
+/** Of an object that every drive has. One that is forced keeps its value. */
 uint32_t objects_get(const objects_t *self, uint16_t index, uint8_t sub);
 void objects_put(objects_t *self, uint16_t index, uint8_t sub, uint32_t value);
 

@@ -13,12 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cia402_slave.h"
+#include "canopen_twin.h"
 #include "heave/cia402.h"
 #include "rig.h"
 
 #define KILLS_DEFAULT  1000
-#define AXES           CIA402_SLAVES
+#define AXES           CANOPEN_TWIN_DRIVES
 #define CYCLE_US       1000u
 #define PERIOD_US      4000u
 #define FRAME_US       110u /* on the wire, at 1 Mbit/s */
@@ -33,7 +33,7 @@ static struct {
     cia402_config_t config;
     sim_can_bus_t bus;
     sim_can_t node;
-    cia402_slave_t slave;
+    canopen_twin_t twin;
     cia402_t driver;
     gateway_t gateway;
     sim_udp_t udp;
@@ -148,7 +148,7 @@ static void start(void)
 
 /* ---- judgement, at the drives ---- */
 
-static void judge_target(unsigned k, const cia402_slave_drive_t *drive)
+static void judge_target(unsigned k, const canopen_twin_drive_t *drive)
 {
     const int32_t from = m_seen[k].is_first ? m_seen[k].position : m_seen[k].target;
     const int32_t step = abs(drive->last_target - from);
@@ -169,17 +169,17 @@ static void judge_target(unsigned k, const cia402_slave_drive_t *drive)
 static void judge(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        const cia402_slave_drive_t *drive = &m.slave.drive[k];
-        if (drive->enabled != m_seen[k].enabled) {
+        const canopen_twin_drive_t *drive = &m.twin.drive[k];
+        if (drive->node.drive.enabled != m_seen[k].enabled) {
             m_seen[k].is_first = true;
             m_enabled++;
         }
         if (drive->setpoints != m_seen[k].setpoints) {
             judge_target(k, drive);
         }
-        m_seen[k].enabled = drive->enabled;
+        m_seen[k].enabled = drive->node.drive.enabled;
         m_seen[k].setpoints = drive->setpoints;
-        m_seen[k].position = drive->position;
+        m_seen[k].position = canopen_twin_position(&m.twin, k);
         m_seen[k].target = drive->last_target;
     }
 }
@@ -188,7 +188,7 @@ static void judge(void)
 static void cycle(void)
 {
     m.now_us += CYCLE_US;
-    cia402_slave_step(&m.slave, m.now_us);
+    canopen_twin_step(&m.twin, m.now_us);
     judge();
     if (m.is_alive) {
         gateway_cycle(&m.gateway, m.now_us);
@@ -197,8 +197,8 @@ static void cycle(void)
 
 static bool has_torque(unsigned k)
 {
-    const cia402_slave_drive_t *drive = &m.slave.drive[k];
-    return drive->is_on && drive->nmt == 0x05 && (drive->status & 0x6F) == 0x27;
+    const node_t *node = &m.twin.drive[k].node;
+    return node->is_powered && node->nmt == 0x05 && drive_is_enabled(&node->drive);
 }
 
 /* ---- a life and a death ---- */
@@ -264,7 +264,7 @@ static void judge_stops(uint64_t killed_us)
 {
     uint64_t first_us = UINT64_MAX, last_us = 0;
     for (unsigned k = 0; k < AXES; k++) {
-        const uint64_t left_us = m.slave.drive[k].left_us;
+        const uint64_t left_us = m.twin.drive[k].left_us;
         if (has_torque(k)) {
             wrong("still has torque after its watch", k);
         } else if (m_seen[k].had_torque) {
@@ -283,7 +283,7 @@ static void be_dead(void)
     uint32_t setpoints[AXES];
     unsigned torques = 0;
     for (unsigned k = 0; k < AXES; k++) {
-        setpoints[k] = m.slave.drive[k].setpoints;
+        setpoints[k] = m.twin.drive[k].setpoints;
         m_seen[k].had_torque = has_torque(k);
         torques += m_seen[k].had_torque;
     }
@@ -296,7 +296,7 @@ static void be_dead(void)
         cycle();
     }
     for (unsigned k = 0; k < AXES; k++) {
-        if (m.slave.drive[k].setpoints > setpoints[k] + 1) {
+        if (m.twin.drive[k].setpoints > setpoints[k] + 1) {
             wrong("more than one target after the kill", k);
         }
     }
@@ -307,12 +307,12 @@ static void suffer(void)
 {
     const unsigned k = below(AXES);
     if (below(3) == 0) {
-        m.slave.drive[k].position += (int32_t)below(4001) - 2000;
-        m_seen[k].position = m.slave.drive[k].position;
+        canopen_twin_place(&m.twin, k, canopen_twin_position(&m.twin, k) + (int32_t)below(4001) - 2000);
+        m_seen[k].position = canopen_twin_position(&m.twin, k);
         m_sagged++;
     }
     if (below(8) == 0) {
-        cia402_slave_power(&m.slave, below(AXES), true);
+        canopen_twin_power(&m.twin, below(AXES), true);
         m_without_power++;
     }
 }
@@ -346,11 +346,11 @@ static void power_up(void)
 {
     m.now_us = 5000000;
     sim_can_bus_init(&m.bus, FRAME_US, NULL, 0);
-    cia402_slave_open(&m.slave, &m.bus);
+    canopen_twin_open(&m.twin, &m.bus);
     sim_inputs_init(&m.inputs, INPUT_ESTOP);
     for (unsigned k = 0; k < AXES; k++) {
-        m.slave.drive[k].position = k < 6 ? SETTLED_COUNTS : 0;
-        m_seen[k].position = m.slave.drive[k].position;
+        canopen_twin_place(&m.twin, k, k < 6 ? SETTLED_COUNTS : 0);
+        m_seen[k].position = canopen_twin_position(&m.twin, k);
     }
 }
 

@@ -7,17 +7,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cia402_slave.h"
+#include "canopen_twin.h"
 #include "unity.h"
 
-#define AXES     CIA402_SLAVES
+#define AXES     CANOPEN_TWIN_DRIVES
 #define CYCLE_US 1000u
 #define PERIOD   4u /* cycles */
 #define MM(x)    ((q32_t)(x)*Q32_ONE)
 
 static sim_can_bus_t bus;
 static sim_can_t node;
-static cia402_slave_t slave;
+static canopen_twin_t twin;
 static cia402_config_t config;
 static cia402_t driver;
 static drives_t hal;
@@ -29,7 +29,7 @@ static unsigned absolute; /* the axis that has no zero to find */
 static hv_status_t cycle(void)
 {
     now_us += CYCLE_US;
-    cia402_slave_step(&slave, now_us);
+    canopen_twin_step(&twin, now_us);
     const hv_status_t status = drives_poll(hal, now_us, feedback);
     (void)!drives_send(hal, now_us, setpoint_q32);
     return status;
@@ -40,6 +40,11 @@ static void cycles(unsigned count)
     while (count-- > 0) {
         (void)!cycle();
     }
+}
+
+static bool is_homing(unsigned drive)
+{
+    return twin.drive[drive].node.drive.homing == HOMING_RUNNING;
 }
 
 static void follow_actual(void)
@@ -91,9 +96,12 @@ void setUp(void)
     memset(setpoint_q32, 0, sizeof setpoint_q32);
     absolute = 6;
     sim_can_bus_init(&bus, 0, NULL, 0);
-    cia402_slave_open(&slave, &bus);
+    canopen_twin_open(&twin, &bus);
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].position = 100000 + 1000 * (int32_t)k;
+        canopen_twin_place(&twin, k, 100000 + 1000 * (int32_t)k);
+        canopen_twin_object(&twin, k, 0x60E3, 0)->value = 3; /* methods of homing: 35, 17, 37 */
+        canopen_twin_object(&twin, k, 0x60E3, 2)->value = 17;
+        canopen_twin_object(&twin, k, 0x60E3, 3)->value = 37;
     }
     configure();
 }
@@ -193,7 +201,7 @@ static unsigned count_sent(uint32_t id, const uint8_t *data, uint8_t length)
 
 static unsigned place(unsigned drive, uint32_t object, unsigned from)
 {
-    const cia402_slave_drive_t *d = &slave.drive[drive];
+    const canopen_twin_drive_t *d = &twin.drive[drive];
     for (unsigned i = from; i < d->logged; i++) {
         if (d->log[i] == object) {
             return i;
@@ -213,25 +221,25 @@ static void test_setup_pdos_are_mapped_in_the_order_every_stack_accepts(void)
         for (size_t i = 0; i < sizeof k_order / sizeof k_order[0]; i++) {
             at = place(k, k_order[i], at) + 1;
         }
-        TEST_ASSERT_EQUAL_HEX32(0x200 + k + 1, cia402_slave_row(&slave, k, 0x1400, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x40000180 + k + 1, cia402_slave_row(&slave, k, 0x1800, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x80000300 + k + 1, cia402_slave_row(&slave, k, 0x1401, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0xC0000280 + k + 1, cia402_slave_row(&slave, k, 0x1801, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x607A0020, cia402_slave_row(&slave, k, 0x1600, 2)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x7F0096, cia402_slave_row(&slave, k, 0x1016, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(4, cia402_slave_row(&slave, k, 0x60C2, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0xFD, cia402_slave_row(&slave, k, 0x60C2, 2)->value);
-        TEST_ASSERT_EQUAL_HEX32(2, cia402_slave_row(&slave, k, 0x605A, 0)->value);
-        TEST_ASSERT_EQUAL_HEX32(10000, cia402_slave_row(&slave, k, 0x6065, 0)->value);
-        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].boots); /* it has just begun anew: nothing to reset */
+        TEST_ASSERT_EQUAL_HEX32(0x200 + k + 1, canopen_twin_object(&twin, k, 0x1400, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x40000180 + k + 1, canopen_twin_object(&twin, k, 0x1800, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x80000300 + k + 1, canopen_twin_object(&twin, k, 0x1401, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0xC0000280 + k + 1, canopen_twin_object(&twin, k, 0x1801, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, k, 0x1600, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x7F0096, canopen_twin_object(&twin, k, 0x1016, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(4, canopen_twin_object(&twin, k, 0x60C2, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0xFD, canopen_twin_object(&twin, k, 0x60C2, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(2, canopen_twin_object(&twin, k, 0x605A, 0)->value);
+        TEST_ASSERT_EQUAL_HEX32(10000, canopen_twin_object(&twin, k, 0x6065, 0)->value);
+        TEST_ASSERT_EQUAL_UINT32(1, twin.drive[k].boots); /* it has just begun anew: nothing to reset */
     }
 }
 
-static void add_object(unsigned drive, uint16_t index, uint8_t sub, uint8_t bytes, uint32_t value)
+/* As it leaves its maker. */
+static void make(unsigned drive, uint16_t index, uint8_t sub, uint32_t value)
 {
-    cia402_slave_drive_t *d = &slave.drive[drive];
-    TEST_ASSERT_TRUE(d->rows < CIA402_SLAVE_ROWS);
-    d->row[d->rows++] = (cia402_slave_row_t){.index = index, .sub = sub, .bytes = bytes, .value = value, .initial = value};
+    object_t *object = canopen_twin_object(&twin, drive, index, sub);
+    object->value = object->fallback = value;
 }
 
 /* Any other than the first four, those too that have the numbers of a second axis elsewhere: a PDO that is on cannot be mapped.
@@ -245,17 +253,17 @@ static void test_setup_pdo_with_a_high_number_is_switched_off_before_it_is_mappe
         setUp();
         config.commands = (cia402_maps_t){.count = 1, .map = {{k_numbers[i], 2, {0x60400010, 0x607A0020}}}};
         for (unsigned k = 0; k < AXES; k++) {
-            add_object(k, record, 1, 4, 0x200 + k + 1); /* on, as the maker has it */
-            add_object(k, record, 2, 1, 255);
-            add_object(k, (uint16_t)map, 0, 1, 1);
-            add_object(k, (uint16_t)map, 1, 4, 0x60400010);
-            add_object(k, (uint16_t)map, 2, 4, 0);
+            twin.drive[k].node.commands = config.commands; /* in the place of the drive's fourth */
+            canopen_twin_power(&twin, k, true);
+            make(k, 0x1403, 1, 0x200 + k + 1); /* on, as the maker has it */
+            make(k, 0x1603, 0, 1);
+            make(k, 0x1603, 2, 0);
         }
         come_up();
         TEST_ASSERT_TRUE(place(0, (uint32_t)record << 8 | 1, 0) < place(0, map << 8, 0));
-        TEST_ASSERT_EQUAL_HEX32(0x201, cia402_slave_row(&slave, 0, record, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x607A0020, cia402_slave_row(&slave, 0, (uint16_t)map, 2)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x80000201, cia402_slave_row(&slave, 0, 0x1400, 1)->value); /* has the same identifier */
+        TEST_ASSERT_EQUAL_HEX32(0x201, canopen_twin_object(&twin, 0, 0x1403, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, 0, 0x1603, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x80000201, canopen_twin_object(&twin, 0, 0x1400, 1)->value); /* has the same identifier */
     }
 }
 
@@ -264,12 +272,12 @@ static void test_setup_drives_that_are_up_already_are_reset_first(void)
     start();
     for (unsigned i = 0; i < 100; i++) {
         now_us += CYCLE_US;
-        cia402_slave_step(&slave, now_us);
+        canopen_twin_step(&twin, now_us);
     }
     TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(sim_can_hal(&node))); /* their boot-up messages were heard by nobody */
     await(DRIVE_DISABLED, 5000);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[k].boots);
+        TEST_ASSERT_EQUAL_UINT32(2, twin.drive[k].boots);
     }
 }
 
@@ -287,7 +295,7 @@ static drive_report_t refusal_of(unsigned drive)
 
 static void test_setup_object_refused_names_drive_object_and_reason(void)
 {
-    cia402_slave_row(&slave, 3, 0x60C2, 1)->refusal = 0x06090030;
+    canopen_twin_object(&twin, 3, 0x60C2, 1)->refusal = 0x06090030;
     const drive_report_t r = refusal_of(3);
     TEST_ASSERT_EQUAL_UINT8(4, r.address);
     TEST_ASSERT_EQUAL_STRING("refused", r.phase);
@@ -300,7 +308,7 @@ static void test_setup_object_refused_names_drive_object_and_reason(void)
 static void test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        cia402_slave_row(&slave, k, 0x60C2, 1)->refusal = 0x06090030;
+        canopen_twin_object(&twin, k, 0x60C2, 1)->refusal = 0x06090030;
     }
     start();
     cycles(4000);
@@ -311,7 +319,7 @@ static void test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again(void
     }
     TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
     for (unsigned k = 0; k < AXES; k++) {
-        cia402_slave_row(&slave, k, 0x60C2, 1)->refusal = 0;
+        canopen_twin_object(&twin, k, 0x60C2, 1)->refusal = 0;
     }
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     for (unsigned i = 0; i < 4000 && !are_all(DRIVE_DISABLED); i++) {
@@ -326,8 +334,8 @@ static void test_loss_all_that_start_again_are_no_lost_bus(void)
     come_up();
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        cia402_slave_power(&slave, k, true);
-        slave.drive[k].boot_us = now_us + CYCLE_US; /* sooner than three answers are missing */
+        canopen_twin_power(&twin, k, true);
+        twin.drive[k].node.boot_due_us = now_us + CYCLE_US; /* sooner than three answers are missing */
     }
     while (!are_all(DRIVE_OFFLINE)) {
         TEST_ASSERT_EQUAL(HV_OK, cycle());
@@ -343,14 +351,14 @@ static void test_loss_all_silent_is_a_lost_bus_until_one_answers(void)
 {
     come_up();
     for (unsigned k = 0; k < AXES; k++) {
-        cia402_slave_power(&slave, k, false);
+        canopen_twin_power(&twin, k, false);
     }
     cycles(40);
     TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
     TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_DISABLE));
     cycles(2000);
     TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
-    cia402_slave_power(&slave, 3, true);
+    canopen_twin_power(&twin, 3, true);
     cycles(2000);
     TEST_ASSERT_EQUAL(HV_OK, cycle());
 }
@@ -360,7 +368,7 @@ static void test_setup_object_with_another_value_tells_both(void)
     for (unsigned k = 0; k < AXES; k++) {
         config.axis[k].identity[0] = 0x2E5;
     }
-    cia402_slave_row(&slave, 2, 0x1018, 1)->value = 0x0B0000EF; /* as large as an abort code */
+    canopen_twin_object(&twin, 2, 0x1018, 1)->value = 0x0B0000EF; /* as large as an abort code */
     const drive_report_t r = refusal_of(2);
     TEST_ASSERT_EQUAL_STRING("it holds another value", r.detail);
     TEST_ASSERT_TRUE(r.has_found);
@@ -371,8 +379,8 @@ static void test_setup_object_with_another_value_tells_both(void)
 
 static void test_setup_object_that_can_only_be_read_is_told_as_such(void)
 {
-    cia402_slave_row(&slave, 3, 0x60C2, 1)->is_read_only = true;
-    cia402_slave_row(&slave, 3, 0x60C2, 1)->value = 10;
+    canopen_twin_object(&twin, 3, 0x60C2, 1)->is_read_only = true;
+    canopen_twin_object(&twin, 3, 0x60C2, 1)->value = 10;
     const drive_report_t r = refusal_of(3);
     TEST_ASSERT_EQUAL_HEX32(0x60C201, r.object);
     TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
@@ -385,33 +393,33 @@ static void test_setup_object_that_can_only_be_read_is_told_as_such(void)
 /* Written first, checked when all of it is written. */
 static void test_setup_mapping_that_can_only_be_read_is_told_as_such(void)
 {
-    cia402_slave_row(&slave, 3, 0x1600, 2)->is_read_only = true;
-    cia402_slave_row(&slave, 3, 0x1600, 2)->value = 0x60FF0020;
+    canopen_twin_object(&twin, 3, 0x1600, 2)->is_read_only = true;
+    canopen_twin_object(&twin, 3, 0x1600, 2)->value = 0x60C10120;
     const drive_report_t r = refusal_of(3);
     TEST_ASSERT_EQUAL_HEX32(0x160002, r.object);
     TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
-    TEST_ASSERT_EQUAL_HEX32(0x60FF0020, r.found);
+    TEST_ASSERT_EQUAL_HEX32(0x60C10120, r.found);
     TEST_ASSERT_EQUAL_HEX32(0x607A0020, r.wanted);
 }
 
 /* 6502h: bit 0 PP, 5 homing, 6 IP, 7 CSP. */
 static void test_setup_mode_that_a_drive_has_not_got_is_refused_before_it_is_asked_for(void)
 {
-    cia402_slave_row(&slave, 2, 0x6502, 0)->value = 0x61;
+    canopen_twin_object(&twin, 2, 0x6502, 0)->value = 0x61;
     const drive_report_t r = refusal_of(2);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_SUCH_MODE, r.code);
     TEST_ASSERT_EQUAL_HEX32(0x650200, r.object);
     TEST_ASSERT_EQUAL_HEX32(0x61, r.found);
     TEST_ASSERT_EQUAL_HEX32(0x80, r.wanted);
     TEST_ASSERT_EQUAL_STRING("a bit for each mode that it supports", r.detail);
-    TEST_ASSERT_EQUAL_UINT32(0, cia402_slave_row(&slave, 2, 0x6060, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(0, canopen_twin_object(&twin, 2, 0x6060, 0)->value);
 }
 
 static void test_setup_homing_that_a_drive_has_not_got_is_refused_where_it_is_wanted(void)
 {
     config.axis[1].homing_method = 17;
     for (unsigned k = 0; k < AXES; k++) {
-        cia402_slave_row(&slave, k, 0x6502, 0)->value = 0xC1;
+        canopen_twin_object(&twin, k, 0x6502, 0)->value = 0xC1;
     }
     const drive_report_t r = refusal_of(1);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_SUCH_MODE, r.code);
@@ -428,8 +436,8 @@ static void test_setup_homing_method_that_is_not_in_the_list_is_refused(void)
     TEST_ASSERT_EQUAL_HEX32(37, r.found);
     TEST_ASSERT_EQUAL_HEX32(18, r.wanted);
     TEST_ASSERT_EQUAL_STRING("the last of the methods that it supports", r.detail);
-    TEST_ASSERT_EQUAL_UINT32(0, cia402_slave_row(&slave, 4, 0x6098, 0)->value);
-    TEST_ASSERT_EQUAL_UINT32(37, cia402_slave_row(&slave, 3, 0x6098, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(0, canopen_twin_object(&twin, 4, 0x6098, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(37, canopen_twin_object(&twin, 3, 0x6098, 0)->value);
 }
 
 /* No object, 0, an empty list, a list that ends early, a method of the maker, no answer, or not asked: nothing is told, and the
@@ -440,25 +448,25 @@ static void test_setup_what_a_drive_does_not_tell_is_no_refusal(void)
         config.axis[k].homing_method = 18;
     }
     config.axis[4].homing_method = -3;
-    cia402_slave_row(&slave, 0, 0x6502, 0)->is_missing = true;
-    cia402_slave_row(&slave, 0, 0x60E3, 0)->is_missing = true;
-    cia402_slave_row(&slave, 1, 0x6502, 0)->value = 0;
-    cia402_slave_row(&slave, 1, 0x60E3, 0)->value = 0;
-    cia402_slave_row(&slave, 2, 0x60E3, 2)->is_missing = true;
-    cia402_slave_row(&slave, 3, 0x6502, 0)->is_silent = true;
-    cia402_slave_row(&slave, 3, 0x60E3, 0)->is_silent = true;
+    canopen_twin_object(&twin, 0, 0x6502, 0)->is_missing = true;
+    canopen_twin_object(&twin, 0, 0x60E3, 0)->is_missing = true;
+    canopen_twin_object(&twin, 1, 0x6502, 0)->value = 0;
+    canopen_twin_object(&twin, 1, 0x60E3, 0)->value = 0;
+    canopen_twin_object(&twin, 2, 0x60E3, 2)->is_missing = true;
+    canopen_twin_object(&twin, 3, 0x6502, 0)->is_silent = true;
+    canopen_twin_object(&twin, 3, 0x60E3, 0)->is_silent = true;
     for (unsigned k = 5; k < AXES; k++) {
-        cia402_slave_row(&slave, k, 0x60E3, 3)->value = 18;
+        canopen_twin_object(&twin, k, 0x60E3, 3)->value = 18;
     }
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(18, cia402_slave_row(&slave, 0, 0x6098, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(18, canopen_twin_object(&twin, 0, 0x6098, 0)->value);
 }
 
 static void test_setup_what_a_drive_tells_does_not_count_where_it_is_not_asked(void)
 {
     config.is_support_checked = false;
     config.axis[4].homing_method = 18;
-    cia402_slave_row(&slave, 2, 0x6502, 0)->value = 0x61;
+    canopen_twin_object(&twin, 2, 0x6502, 0)->value = 0x61;
     come_up();
 }
 
@@ -487,10 +495,10 @@ static void test_setup_position_limits_are_written_where_wanted(void)
     config.axis[1].has_limits = true;
     config.axis[1].limit_counts[0] = -5000;
     config.axis[1].limit_counts[1] = 205000;
-    cia402_slave_row(&slave, 1, 0x607D, 2)->refusal = 0x06090036; /* a second line of defence: no reason to refuse a drive */
+    canopen_twin_object(&twin, 1, 0x607D, 2)->refusal = 0x06090036; /* a second line of defence: no reason to refuse a drive */
     come_up();
-    TEST_ASSERT_EQUAL_INT32(-5000, (int32_t)cia402_slave_row(&slave, 1, 0x607D, 1)->value);
-    TEST_ASSERT_EQUAL_INT32(0, (int32_t)cia402_slave_row(&slave, 0, 0x607D, 1)->value);
+    TEST_ASSERT_EQUAL_INT32(-5000, (int32_t)canopen_twin_object(&twin, 1, 0x607D, 1)->value);
+    TEST_ASSERT_EQUAL_INT32(0, (int32_t)canopen_twin_object(&twin, 0, 0x607D, 1)->value);
 }
 
 /* --- Start-up lists --- */
@@ -519,16 +527,16 @@ static void test_startup_list_is_written_before_and_behind_everything_else(void)
     list();
     come_up();
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(50, cia402_slave_row(&slave, k, 0x2030, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, cia402_slave_row(&slave, k, 0x2031, 0)->value);
+        TEST_ASSERT_EQUAL_UINT32(50, canopen_twin_object(&twin, k, 0x2030, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, canopen_twin_object(&twin, k, 0x2031, 0)->value);
         TEST_ASSERT_TRUE(place(k, 0x203001, 0) < place(k, 0x101700, 0));
         TEST_ASSERT_TRUE(place(k, 0x203100, 0) > place(k, 0x60C201, 0));
         TEST_ASSERT_TRUE(place(k, 0x203100, 0) < place(k, 0x606000, 0));
     }
-    const unsigned before = slave.drive[2].logged;
-    cia402_slave_power(&slave, 2, false);
+    const unsigned before = twin.drive[2].logged;
+    canopen_twin_power(&twin, 2, false);
     cycles(50);
-    cia402_slave_power(&slave, 2, true);
+    canopen_twin_power(&twin, 2, true);
     cycles(2000);
     TEST_ASSERT_TRUE(place(2, 0x203001, before) < place(2, 0x203100, before)); /* again after each boot-up */
     enable();
@@ -537,7 +545,7 @@ static void test_startup_list_is_written_before_and_behind_everything_else(void)
 static void test_startup_list_that_a_drive_does_not_take_names_the_object(void)
 {
     list();
-    cia402_slave_row(&slave, 4, 0x2030, 1)->is_missing = true;
+    canopen_twin_object(&twin, 4, 0x2030, 1)->is_missing = true;
     drive_report_t r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, r.code);
     TEST_ASSERT_EQUAL_HEX32(0x203001, r.object);
@@ -545,7 +553,7 @@ static void test_startup_list_that_a_drive_does_not_take_names_the_object(void)
 
     setUp();
     list();
-    cia402_slave_row(&slave, 4, 0x2031, 0)->is_read_only = true;
+    canopen_twin_object(&twin, 4, 0x2031, 0)->is_read_only = true;
     r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(0x203100, r.object);
     TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, r.wanted);
@@ -554,12 +562,12 @@ static void test_startup_list_that_a_drive_does_not_take_names_the_object(void)
     list();
     items[0].is_checked = false; /* nothing is read back, so the refusal itself counts */
     give_list();
-    cia402_slave_row(&slave, 4, 0x2031, 0)->is_read_only = true;
+    canopen_twin_object(&twin, 4, 0x2031, 0)->is_read_only = true;
     TEST_ASSERT_EQUAL_HEX32(0x203100, refusal_of(4).object);
 
     setUp();
     list();
-    cia402_slave_row(&slave, 4, 0x2032, 0)->value = 4;
+    canopen_twin_object(&twin, 4, 0x2032, 0)->value = 4;
     r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(0x203200, r.object);
     TEST_ASSERT_EQUAL_HEX32(4, r.found);
@@ -571,11 +579,11 @@ static void test_startup_list_item_that_may_be_missing_is_passed_over(void)
     list();
     items[1].is_optional = true;
     give_list();
-    cia402_slave_row(&slave, 4, 0x2030, 1)->is_missing = true;
-    cia402_slave_row(&slave, 5, 0x2030, 1)->refusal = 0x06090030;
+    canopen_twin_object(&twin, 4, 0x2030, 1)->is_missing = true;
+    canopen_twin_object(&twin, 5, 0x2030, 1)->refusal = 0x06090030;
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(7, cia402_slave_row(&slave, 5, 0x2030, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, cia402_slave_row(&slave, 4, 0x2031, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(7, canopen_twin_object(&twin, 5, 0x2030, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, canopen_twin_object(&twin, 4, 0x2031, 0)->value);
 }
 
 static void test_startup_list_too_long_is_refused(void)
@@ -593,9 +601,9 @@ static void test_wishes_are_what_is_written(void)
     list();
     config.axis[0].homing_method = 17;
     come_up();
-    const uint32_t logged = slave.drive[0].logged;
+    const uint32_t logged = twin.drive[0].logged;
     while (cia402_next_wish(&config, 0, &wish)) {
-        if (wish.is_written && cia402_slave_row(&slave, 0, wish.index, wish.sub) != NULL) {
+        if (wish.is_written && canopen_twin_object(&twin, 0, wish.index, wish.sub) != NULL) {
             (void)place(0, (uint32_t)wish.index << 8 | wish.sub, 0);
             written++;
         }
@@ -610,7 +618,7 @@ static void test_wishes_are_what_is_written(void)
 
 static void test_setup_other_profile_is_refused(void)
 {
-    cia402_slave_row(&slave, 0, 0x1000, 0)->value = 0x00020191;
+    canopen_twin_object(&twin, 0, 0x1000, 0)->value = 0x00020191;
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_402, refusal_of(0).code);
 }
 
@@ -620,12 +628,12 @@ static void test_setup_missing_guard_is_refused_unless_allowed(void)
     for (size_t i = 0; i < 5; i++) {
         const uint8_t sub = k_guards[i] == 0x1016 ? 1 : 0;
         setUp();
-        cia402_slave_row(&slave, 1, k_guards[i], sub)->is_missing = true;
+        canopen_twin_object(&twin, 1, k_guards[i], sub)->is_missing = true;
         const drive_report_t refused = refusal_of(1);
         TEST_ASSERT_EQUAL_HEX32(CIA402_UNGUARDED, refused.code);
         TEST_ASSERT_EQUAL_HEX32((uint32_t)k_guards[i] << 8 | sub, refused.object);
         setUp();
-        cia402_slave_row(&slave, 1, k_guards[i], sub)->is_missing = true;
+        canopen_twin_object(&twin, 1, k_guards[i], sub)->is_missing = true;
         config.is_unguarded_allowed = true;
         come_up();
         TEST_ASSERT_EQUAL_HEX32((uint32_t)k_guards[i] << 8 | sub, report(1).object);
@@ -646,9 +654,9 @@ static void test_setup_guard_that_cannot_be_written_is_taken_where_it_is_on(void
                   {0x1016, 1, 0x7F012C, true} /* twice of what was asked for */};
     for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         setUp();
-        cia402_slave_row_t *row = cia402_slave_row(&slave, 1, k_rows[i].index, k_rows[i].sub);
+        object_t *row = canopen_twin_object(&twin, 1, k_rows[i].index, k_rows[i].sub);
         row->is_read_only = true;
-        row->value = row->initial = k_rows[i].value;
+        row->value = row->fallback = k_rows[i].value;
         if (k_rows[i].is_taken) {
             come_up();
         } else {
@@ -663,9 +671,9 @@ static void test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allo
     for (unsigned is_allowed = 0; is_allowed < 2; is_allowed++) {
         setUp();
         config.is_unguarded_allowed = is_allowed != 0;
-        cia402_slave_row_t *row = cia402_slave_row(&slave, 1, 0x1016, 1);
+        object_t *row = canopen_twin_object(&twin, 1, 0x1016, 1);
         row->is_read_only = true;
-        row->value = row->initial = 0x7F012D;
+        row->value = row->fallback = 0x7F012D;
         if (is_allowed != 0) {
             come_up();
             TEST_ASSERT_EQUAL_HEX32(0x101601, report(1).object);
@@ -684,13 +692,13 @@ static void test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allo
 
 static void test_setup_without_heartbeats_is_refused(void)
 {
-    slave.drive[5].has_no_beat = true;
+    twin.drive[5].node.has_no_heartbeat = true;
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_HEARTBEAT, refusal_of(5).code);
 }
 
 static void test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_its_tpdos(void)
 {
-    slave.drive[5].has_no_beat = true;
+    twin.drive[5].node.has_no_heartbeat = true;
     config.is_unguarded_allowed = true;
     come_up();
     TEST_ASSERT_EQUAL_HEX32(0x101700, report(5).object);
@@ -698,7 +706,7 @@ static void test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_
     enable();
     cycles(500);
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
-    slave.drive[5].is_mute = true;
+    twin.drive[5].node.is_mute = true;
     TEST_ASSERT_TRUE(cycles_until(5, DRIVE_OFFLINE, 100) <= 4 * PERIOD + 1);
     TEST_ASSERT_EQUAL_HEX32(CIA402_LOST_TPDO, feedback[5].fault_code);
     TEST_ASSERT_EQUAL_STRING("", report(5).detail);
@@ -711,8 +719,8 @@ static void test_setup_drive_that_goes_operational_by_itself_is_told_again(void)
     spy();
     for (unsigned i = 0; i < 400; i++) {
         (void)!cycle();
-        if (slave.drive[1].nmt == 0x7F && driver.axis[1].phase == CIA402_CONFIGURING) {
-            slave.drive[1].nmt = 0x05;
+        if (twin.drive[1].node.nmt == 0x7F && driver.axis[1].phase == CIA402_CONFIGURING) {
+            twin.drive[1].node.nmt = 0x05;
         }
     }
     TEST_ASSERT_EQUAL_STRING("configuring", report(1).phase);
@@ -724,18 +732,18 @@ static void test_setup_optional_objects_missing_is_no_trouble(void)
 {
     static const uint16_t k_optional[] = {0x1006, 0x1019, 0x605B, 0x605C, 0x6066};
     for (size_t i = 0; i < 5; i++) {
-        cia402_slave_row(&slave, 1, k_optional[i], 0)->is_missing = true;
-        cia402_slave_row(&slave, 2, k_optional[i], 0)->is_read_only = true;
+        canopen_twin_object(&twin, 1, k_optional[i], 0)->is_missing = true;
+        canopen_twin_object(&twin, 2, k_optional[i], 0)->is_read_only = true;
     }
     come_up();
 }
 
 static void test_setup_missing_drive_is_named_and_taken_when_it_comes(void)
 {
-    cia402_slave_power(&slave, 6, false);
+    canopen_twin_power(&twin, 6, false);
     TEST_ASSERT_EQUAL_HEX32(CIA402_SILENT, refusal_of(6).code);
     TEST_ASSERT_EQUAL_STRING("missing", report(6).phase);
-    cia402_slave_power(&slave, 6, true);
+    canopen_twin_power(&twin, 6, true);
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX32(0, report(6).code);
 }
@@ -743,17 +751,17 @@ static void test_setup_missing_drive_is_named_and_taken_when_it_comes(void)
 /* It answers, only not when it is asked for that. */
 static void test_setup_object_that_is_never_answered_is_named_and_not_tried_for_ever(void)
 {
-    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = true;
     const drive_report_t r = refusal_of(2);
     TEST_ASSERT_EQUAL_STRING("refused", r.phase);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, r.code);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, feedback[2].fault_code);
     TEST_ASSERT_EQUAL_HEX32(0x606500, r.object);
-    const uint32_t boots = slave.drive[2].boots;
+    const uint32_t boots = twin.drive[2].boots;
     TEST_ASSERT_TRUE(boots <= 3);
     cycles(10000);
-    TEST_ASSERT_EQUAL_UINT32(boots, slave.drive[2].boots);
-    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = false;
+    TEST_ASSERT_EQUAL_UINT32(boots, twin.drive[2].boots);
+    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = false;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
@@ -763,7 +771,7 @@ static void test_setup_object_that_is_never_answered_is_named_and_not_tried_for_
 /* While it is tried again, too: an engage would be refused for a reason. */
 static void test_setup_object_without_answer_is_named_while_it_is_tried_again(void)
 {
-    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = true;
     start();
     for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
         (void)!cycle();
@@ -777,19 +785,19 @@ static void test_setup_object_without_answer_is_named_while_it_is_tried_again(vo
 
 static void test_setup_object_that_may_be_missing_may_be_without_answer(void)
 {
-    cia402_slave_row(&slave, 2, 0x605B, 0)->is_silent = true;
+    canopen_twin_object(&twin, 2, 0x605B, 0)->is_silent = true;
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].boots);
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].boots);
 }
 
 static void test_setup_one_question_without_answer_is_asked_again_from_the_beginning(void)
 {
-    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = true;
     start();
     for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
         (void)!cycle();
     }
-    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = false;
+    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = false;
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
 }
@@ -798,7 +806,7 @@ static void test_setup_one_question_without_answer_is_asked_again_from_the_begin
 static void test_enable_drive_that_does_not_answer_for_its_mode_is_named(void)
 {
     come_up();
-    cia402_slave_row(&slave, 4, 0x6061, 0)->is_silent = true;
+    canopen_twin_object(&twin, 4, 0x6061, 0)->is_silent = true;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(8000);
     TEST_ASSERT_EQUAL_STRING("refused", report(4).phase);
@@ -808,21 +816,21 @@ static void test_enable_drive_that_does_not_answer_for_its_mode_is_named(void)
 /* Every answer is given to the next question only: with the retries each object is right in the end. */
 static void test_setup_answers_that_come_late_do_not_confuse(void)
 {
-    slave.drive[2].is_answering_late = true;
+    twin.drive[2].is_answering_late = true;
     start();
     await(DRIVE_DISABLED, 60000);
-    TEST_ASSERT_EQUAL_HEX32(0x607A0020, cia402_slave_row(&slave, 2, 0x1600, 2)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x7F0096, cia402_slave_row(&slave, 2, 0x1016, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(10000, cia402_slave_row(&slave, 2, 0x6065, 0)->value);
-    slave.drive[2].is_answering_late = false;
+    TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, 2, 0x1600, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x7F0096, canopen_twin_object(&twin, 2, 0x1016, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(10000, canopen_twin_object(&twin, 2, 0x6065, 0)->value);
+    twin.drive[2].is_answering_late = false;
     enable();
 }
 
 static void test_setup_refused_drive_is_tried_again_by_a_reset(void)
 {
-    cia402_slave_row(&slave, 3, 0x6060, 0)->refusal = 0x06090030;
+    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0x06090030;
     (void)refusal_of(3);
-    cia402_slave_row(&slave, 3, 0x6060, 0)->refusal = 0;
+    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0;
     cycles(2000);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[3].state);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
@@ -835,16 +843,16 @@ static void test_setup_refusal_that_may_pass_is_asked_again_before_it_counts(voi
     static const uint32_t k_codes[] = {0x06010000, 0x08000021, 0x08000022};
     for (size_t i = 0; i < 3; i++) {
         setUp();
-        cia402_slave_row(&slave, 1, 0x60C2, 1)->refusal = k_codes[i];
+        canopen_twin_object(&twin, 1, 0x60C2, 1)->refusal = k_codes[i];
         start();
         for (unsigned n = 0; n < 2000 && driver.axis[1].setup.tries < 2; n++) {
             (void)!cycle();
         }
         TEST_ASSERT_EQUAL_UINT8(2, driver.axis[1].setup.tries);
-        cia402_slave_row(&slave, 1, 0x60C2, 1)->refusal = 0;
+        canopen_twin_object(&twin, 1, 0x60C2, 1)->refusal = 0;
         await(DRIVE_DISABLED, 1000);
         setUp();
-        cia402_slave_row(&slave, 1, 0x60C2, 1)->refusal = k_codes[i];
+        canopen_twin_object(&twin, 1, 0x60C2, 1)->refusal = k_codes[i];
         const drive_report_t refused = refusal_of(1);
         TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, refused.code);
         TEST_ASSERT_EQUAL_HEX32(k_codes[i], refused.detail_code);
@@ -853,20 +861,16 @@ static void test_setup_refusal_that_may_pass_is_asked_again_before_it_counts(voi
 
 static void test_setup_mode_may_show_late_but_not_never(void)
 {
+    canopen_twin_force(&twin, 1, 0x6061, 0, 0);
     start();
-    for (unsigned i = 0; i < 3000; i++) {
-        (void)!cycle();
-        cia402_slave_row(&slave, 1, 0x6061, 0)->value = 0;
-    }
+    cycles(3000);
     TEST_ASSERT_EQUAL_HEX32(0x606100, report(1).object);
-    cia402_slave_row(&slave, 1, 0x6061, 0)->value = 8;
+    canopen_twin_object(&twin, 1, 0x6061, 0)->is_forced = false;
     await(DRIVE_DISABLED, 100);
     setUp();
+    canopen_twin_force(&twin, 1, 0x6061, 0, 0);
     start();
-    for (unsigned i = 0; i < 6000; i++) {
-        (void)!cycle();
-        cia402_slave_row(&slave, 1, 0x6061, 0)->value = 0;
-    }
+    cycles(6000);
     TEST_ASSERT_EQUAL_STRING("refused", report(1).phase);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_MODE, report(1).code);
     TEST_ASSERT_EQUAL_HEX32(0x606100, report(1).object);
@@ -875,7 +879,7 @@ static void test_setup_mode_may_show_late_but_not_never(void)
 
 static void test_setup_drive_that_does_not_tell_its_type_is_refused(void)
 {
-    cia402_slave_row(&slave, 0, 0x1000, 0)->is_missing = true;
+    canopen_twin_object(&twin, 0, 0x1000, 0)->is_missing = true;
     const drive_report_t r = refusal_of(0);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_402, r.code);
     TEST_ASSERT_EQUAL_STRING("there is no such object", r.detail);
@@ -887,7 +891,7 @@ static void start_beside_drives_that_are_up(void)
     start();
     for (unsigned i = 0; i < 100; i++) {
         now_us += CYCLE_US;
-        cia402_slave_step(&slave, now_us);
+        canopen_twin_step(&twin, now_us);
     }
     TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(sim_can_hal(&node)));
 }
@@ -898,7 +902,7 @@ static void test_setup_without_reset_takes_drives_as_they_are(void)
     start_beside_drives_that_are_up();
     await(DRIVE_DISABLED, 5000);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].boots);
+        TEST_ASSERT_EQUAL_UINT32(1, twin.drive[k].boots);
     }
 }
 
@@ -906,12 +910,12 @@ static void test_setup_drive_that_boots_without_a_word_is_asked_all_the_same(voi
 {
     start_beside_drives_that_are_up();
     for (unsigned i = 0; i < 400; i++) {
-        slave.drive[2].is_mute = i > 0 && slave.drive[2].nmt == 0;
+        twin.drive[2].node.is_mute = i > 0 && twin.drive[2].node.nmt == 0;
         (void)!cycle();
     }
     TEST_ASSERT_EQUAL_STRING("booting", report(2).phase);
     await(DRIVE_DISABLED, 1000);
-    TEST_ASSERT_EQUAL_UINT32(2, slave.drive[2].boots);
+    TEST_ASSERT_EQUAL_UINT32(2, twin.drive[2].boots);
 }
 
 static void cycles_until_phase(unsigned axis, cia402_phase_t phase)
@@ -926,10 +930,10 @@ static void test_setup_drive_that_falls_silent_is_missing_until_it_answers(void)
 {
     start();
     cycles_until_phase(1, CIA402_CONFIGURING);
-    slave.drive[1].is_deaf_sdo = true;
+    twin.drive[1].node.is_sdo_silent = true;
     cycles_until_phase(1, CIA402_MISSING);
     TEST_ASSERT_EQUAL_HEX32(CIA402_SILENT, feedback[1].fault_code);
-    slave.drive[1].is_deaf_sdo = false;
+    twin.drive[1].node.is_sdo_silent = false;
     await(DRIVE_DISABLED, 2000);
     TEST_ASSERT_EQUAL_HEX32(0, report(1).code);
 }
@@ -941,23 +945,23 @@ static void test_setup_drive_that_boots_in_the_midst_begins_anew(void)
         setUp();
         start();
         cycles_until_phase(1, k_phases[i]);
-        cia402_slave_power(&slave, 1, true);
+        canopen_twin_power(&twin, 1, true);
         for (unsigned n = 0; n < 100 && report(1).code == 0; n++) {
             (void)!cycle();
         }
         TEST_ASSERT_EQUAL_HEX32(CIA402_REBOOTED, report(1).code);
         await(DRIVE_DISABLED, 2000);
-        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[1].boots); /* not reset once more */
+        TEST_ASSERT_EQUAL_UINT32(2, twin.drive[1].boots); /* not reset once more */
         TEST_ASSERT_EQUAL_HEX32(0, report(1).code);
     }
 }
 
 static void test_setup_refused_drive_is_tried_again_when_it_boots(void)
 {
-    cia402_slave_row(&slave, 3, 0x6060, 0)->refusal = 0x06090030;
+    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0x06090030;
     (void)refusal_of(3);
-    cia402_slave_row(&slave, 3, 0x6060, 0)->refusal = 0;
-    cia402_slave_power(&slave, 3, true);
+    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0;
+    canopen_twin_power(&twin, 3, true);
     await(DRIVE_DISABLED, 3000);
 }
 
@@ -966,22 +970,22 @@ static void test_setup_drive_whose_position_cannot_be_read_is_refused(void)
 {
     for (unsigned i = 0; i < 2; i++) {
         setUp();
-        slave.drive[5].tpdo_cut = i == 0;
+        twin.drive[5].tpdo_cut = i == 0;
         if (i == 1) {
             config.axis[5].scale.num = 1;
-            slave.drive[5].position = INT32_MAX;
+            canopen_twin_place(&twin, 5, INT32_MAX);
         }
         const drive_report_t r = refusal_of(5);
         TEST_ASSERT_EQUAL_HEX32(CIA402_NO_START, r.code);
         TEST_ASSERT_EQUAL_HEX32(0, r.object);
         TEST_ASSERT_FALSE(feedback[5].has_actual);
-        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[5].boots); /* tried from the beginning twice */
-        cia402_slave_power(&slave, 5, true);
+        TEST_ASSERT_EQUAL_UINT32(2, twin.drive[5].boots); /* tried from the beginning twice */
+        canopen_twin_power(&twin, 5, true);
         cycles(3000);
         TEST_ASSERT_EQUAL_STRING("refused", report(5).phase);
-        TEST_ASSERT_EQUAL_UINT32(4, slave.drive[5].boots); /* and again when it boots */
-        slave.drive[5].tpdo_cut = 0;
-        slave.drive[5].position = 0;
+        TEST_ASSERT_EQUAL_UINT32(4, twin.drive[5].boots); /* and again when it boots */
+        twin.drive[5].tpdo_cut = 0;
+        canopen_twin_place(&twin, 5, 0);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
         await(DRIVE_DISABLED, 3000);
     }
@@ -994,18 +998,18 @@ static void test_enable_all_together_without_a_jump(void)
     come_up();
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        const cia402_slave_drive_t *d = &slave.drive[k];
+        const canopen_twin_drive_t *d = &twin.drive[k];
         TEST_ASSERT_EQUAL_INT32(0, d->largest_step);
-        TEST_ASSERT_EQUAL_UINT32(1, d->enabled);
-        TEST_ASSERT_TRUE(d->enabled_us - slave.drive[0].enabled_us <= 10000); /* brakes of 8 to 14 ms */
-        TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, d->position);
+        TEST_ASSERT_EQUAL_UINT32(1, d->node.drive.enabled);
+        TEST_ASSERT_TRUE(d->enabled_us - twin.drive[0].enabled_us <= 10000); /* brakes of 8 to 14 ms */
+        TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, canopen_twin_position(&twin, k));
     }
 }
 
 static void test_enable_drives_whose_states_move_by_themselves_come_up(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_restless = k % 2 == 0;
+        twin.drive[k].is_restless = k % 2 == 0;
     }
     come_up();
     cycles(57);
@@ -1024,13 +1028,13 @@ static void test_enable_drive_that_does_not_come_along_leads_all_back(void)
     } k_cases[] = {{0x21, 0, CIA402_NO_POWER},
                    {0x40, 0, CIA402_NO_POWER},
                    {0x23, 0, CIA402_NO_TORQUE},
-                   {0x21, 0x0200, CIA402_REMOTE_OFF},               /* under local control */
-                   {CIA402_SLAVE_PLAIN, 0x1000, CIA402_NO_TORQUE}}; /* operation enabled, but it does not follow */
+                   {0x21, 0x0200, CIA402_REMOTE_OFF},   /* under local control */
+                   {0xFFFF, 0x1000, CIA402_NO_TORQUE}}; /* operation enabled, but it does not follow */
     for (size_t i = 0; i < 5; i++) {
         setUp();
-        slave.drive[4].is_stuck = true;
-        slave.drive[4].stuck_at = k_cases[i].at;
-        slave.drive[4].status_clear = k_cases[i].status_clear;
+        twin.drive[4].is_stuck = true;
+        twin.drive[4].stuck_at = k_cases[i].at;
+        twin.drive[4].node.drive.bits_clear = k_cases[i].status_clear;
         come_up();
         follow_actual();
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
@@ -1039,10 +1043,10 @@ static void test_enable_drive_that_does_not_come_along_leads_all_back(void)
         cycles(50);
         for (unsigned k = 0; k < AXES; k++) {
             TEST_ASSERT_EQUAL(k == 4 ? DRIVE_FAULT : DRIVE_DISABLED, feedback[k].state);
-            TEST_ASSERT_TRUE(k == 4 || slave.drive[k].status == 0x40 || slave.drive[k].status == 0x21);
+            TEST_ASSERT_TRUE(k == 4 || twin.drive[k].node.drive.state == 0x40 || twin.drive[k].node.drive.state == 0x21);
         }
-        slave.drive[4].is_stuck = false;
-        slave.drive[4].status_clear = 0;
+        twin.drive[4].is_stuck = false;
+        twin.drive[4].node.drive.bits_clear = 0;
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
         await(DRIVE_DISABLED, 100);
         enable();
@@ -1053,34 +1057,34 @@ static void test_enable_drive_that_does_not_come_along_leads_all_back(void)
 static void test_enable_drive_that_does_not_say_that_it_follows_is_believed_after_a_while(void)
 {
     config.power_timeout_ms = 1000;
-    slave.drive[4].status_clear = 0x1000;
+    twin.drive[4].node.drive.bits_clear = 0x1000;
     come_up();
     const uint64_t begin_us = now_us;
     enable();
     TEST_ASSERT_TRUE(now_us - begin_us >= 500000 && now_us - begin_us < 700000);
-    TEST_ASSERT_EQUAL_INT32(0, slave.drive[4].largest_step);
+    TEST_ASSERT_EQUAL_INT32(0, twin.drive[4].largest_step);
 }
 
 static void test_enable_drive_that_shows_another_mode_gets_no_set_point(void)
 {
     for (unsigned i = 0; i < 2; i++) {
         setUp();
-        slave.drive[4].status_clear = 0x0200; /* also under local control: the mode is what hinders */
+        twin.drive[4].node.drive.bits_clear = 0x0200; /* also under local control: the mode is what hinders */
         come_up();
-        slave.drive[4].status_clear = i == 0 ? 0x0200 : 0;
+        twin.drive[4].node.drive.bits_clear = i == 0 ? 0x0200 : 0;
         follow_actual();
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
         for (unsigned n = 0; n < 8000 && feedback[4].state != DRIVE_FAULT; n++) {
             (void)!cycle();
-            if (i == 0 || slave.drive[4].status == 0x27) {
-                slave.drive[4].mode = -1; /* a maker's own */
+            if (i == 0 || twin.drive[4].node.drive.state == 0x27) {
+                twin.drive[4].node.drive.mode = -1; /* a maker's own */
             }
         }
         TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[4].state);
         TEST_ASSERT_EQUAL_HEX32(i == 0 ? CIA402_NO_MODE : CIA402_NO_TORQUE, feedback[4].fault_code);
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_EQUAL_UINT32(i, slave.drive[k].enabled);
-            TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
+            TEST_ASSERT_EQUAL_UINT32(i, twin.drive[k].node.drive.enabled);
+            TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
         }
     }
 }
@@ -1088,7 +1092,7 @@ static void test_enable_drive_that_shows_another_mode_gets_no_set_point(void)
 static void test_enable_drive_that_takes_no_mode_stops_all(void)
 {
     come_up();
-    cia402_slave_row(&slave, 4, 0x6060, 0)->refusal = 0x06090030;
+    canopen_twin_object(&twin, 4, 0x6060, 0)->refusal = 0x06090030;
     follow_actual();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     (void)cycles_until(4, DRIVE_FAULT, 200);
@@ -1098,13 +1102,13 @@ static void test_enable_drive_that_takes_no_mode_stops_all(void)
     TEST_ASSERT_EQUAL_HEX32(0x06090030, report(4).detail_code);
     setUp();
     come_up();
-    slave.drive[4].is_deaf_sdo = true;
+    twin.drive[4].node.is_sdo_silent = true;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     (void)cycles_until(4, DRIVE_OFFLINE, 1000);
     TEST_ASSERT_EQUAL_HEX32(CIA402_SILENT, feedback[4].fault_code);
     cycles(50);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].enabled);
+        TEST_ASSERT_EQUAL_UINT32(0, twin.drive[k].node.drive.enabled);
         TEST_ASSERT_EQUAL(k == 4 ? DRIVE_OFFLINE : DRIVE_DISABLED, feedback[k].state);
     }
 }
@@ -1116,16 +1120,16 @@ static void test_enable_while_enabled_changes_nothing_but_brings_back_who_fell_o
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(50);
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[0].enabled);
-    cia402_slave_drop(&slave, 2);
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[0].node.drive.enabled);
+    canopen_twin_drop(&twin, 2);
     cycles(50);
     for (unsigned k = 0; k < AXES; k++) {
         TEST_ASSERT_EQUAL(k == 2 ? DRIVE_DISABLED : DRIVE_ENABLED, feedback[k].state); /* the gateway decides */
     }
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[k].enabled); /* all anew, all together */
-        TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
+        TEST_ASSERT_EQUAL_UINT32(2, twin.drive[k].node.drive.enabled); /* all anew, all together */
+        TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
     }
 }
 
@@ -1133,22 +1137,22 @@ static void test_send_set_points_arrive_as_counts_one_set_per_period(void)
 {
     come_up();
     enable();
-    const uint32_t before = slave.drive[0].setpoints;
+    const uint32_t before = twin.drive[0].setpoints;
     for (int i = 0; i < 400; i++) {
         for (unsigned k = 0; k < AXES; k++) {
             setpoint_q32[k] += MM(1) / 100;
         }
         TEST_ASSERT_EQUAL(HV_OK, cycle());
     }
-    TEST_ASSERT_UINT32_WITHIN(2, 100, slave.drive[0].setpoints - before);
-    TEST_ASSERT_EQUAL_INT32(40, slave.drive[6].largest_step);
+    TEST_ASSERT_UINT32_WITHIN(2, 100, twin.drive[0].setpoints - before);
+    TEST_ASSERT_EQUAL_INT32(40, twin.drive[6].largest_step);
     cycles(3 * PERIOD);
-    TEST_ASSERT_EQUAL_INT32(104000, slave.drive[0].position);
+    TEST_ASSERT_EQUAL_INT32(104000, canopen_twin_position(&twin, 0));
 }
 
 static void test_send_position_wraps_round_without_a_jump(void)
 {
-    slave.drive[6].position = INT32_MAX - 100;
+    canopen_twin_place(&twin, 6, INT32_MAX - 100);
     come_up();
     enable();
     for (int i = 0; i < 100; i++) {
@@ -1156,7 +1160,7 @@ static void test_send_position_wraps_round_without_a_jump(void)
         TEST_ASSERT_EQUAL(HV_OK, cycle());
     }
     cycles(3 * PERIOD);
-    TEST_ASSERT_EQUAL_INT32(INT32_MIN + 899, slave.drive[6].position);
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN + 899, canopen_twin_position(&twin, 6));
     TEST_ASSERT_TRUE(feedback[6].actual_mm_q32 > MM(2147483));
 }
 
@@ -1172,7 +1176,7 @@ static void test_send_lag_beyond_the_window_is_a_fault_unless_it_is_not_watched(
         while (setpoint_q32[2] - from_q32 < MM(15) && feedback[2].state == DRIVE_ENABLED) {
             setpoint_q32[2] += MM(1) / 10;
             (void)!cycle();
-            slave.drive[2].position = 102000;
+            canopen_twin_place(&twin, 2, 102000);
         }
         TEST_ASSERT_EQUAL(i == 0 ? DRIVE_FAULT : DRIVE_ENABLED, feedback[2].state);
         TEST_ASSERT_EQUAL_HEX32(i == 0 ? 0x8611 : 0, feedback[2].fault_code);
@@ -1180,7 +1184,7 @@ static void test_send_lag_beyond_the_window_is_a_fault_unless_it_is_not_watched(
                                     feedback[2].guard.lag_q32 < MM(11) && feedback[2].guard.allowed_q32 == MM(10)));
         TEST_ASSERT_TRUE(i != 0 || strcmp("heaved found its set-point too far from its position, and has not sent it",
                                           report(2).trouble) == 0);
-        TEST_ASSERT_INT_WITHIN(1000, i == 0 ? 10000 : 15000, slave.drive[2].last_target - 102000);
+        TEST_ASSERT_INT_WITHIN(1000, i == 0 ? 10000 : 15000, twin.drive[2].last_target - 102000);
     }
 }
 
@@ -1190,16 +1194,16 @@ static void test_send_set_point_that_has_no_counts_is_a_fault_and_not_sent(void)
     config.axis[2].window_counts = 1;
     come_up();
     enable();
-    const uint32_t setpoints = slave.drive[2].setpoints;
+    const uint32_t setpoints = twin.drive[2].setpoints;
     setpoint_q32[2] = INT64_MIN;
     (void)cycles_until(2, DRIVE_FAULT, 2 * PERIOD);
     TEST_ASSERT_EQUAL_HEX32(0x8611, feedback[2].fault_code);
     TEST_ASSERT_TRUE(feedback[2].guard.jump_q32 > 0);
     TEST_ASSERT_EQUAL_HEX32(0, report(2).object);
     cycles(5 * PERIOD);
-    TEST_ASSERT_INT_WITHIN(2, (int)setpoints, (int)slave.drive[2].setpoints);
-    TEST_ASSERT_EQUAL_INT32(102000, slave.drive[2].position);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].quick_stops);
+    TEST_ASSERT_INT_WITHIN(2, (int)setpoints, (int)twin.drive[2].setpoints);
+    TEST_ASSERT_EQUAL_INT32(102000, canopen_twin_position(&twin, 2));
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].quick_stops);
 }
 
 /* --- Losses --- */
@@ -1212,7 +1216,7 @@ static unsigned cycles_to_loss(uint32_t code, drive_state_t state)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(5 * PERIOD);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(k == 2 || slave.drive[k].quick_stops == 1);
+        TEST_ASSERT_TRUE(k == 2 || twin.drive[k].quick_stops == 1);
     }
     return count;
 }
@@ -1221,10 +1225,10 @@ static void test_poll_drive_silent_is_lost_after_three_syncs(void)
 {
     come_up();
     enable();
-    slave.drive[2].is_mute = true;
+    twin.drive[2].node.is_mute = true;
     TEST_ASSERT_TRUE(cycles_to_loss(CIA402_LOST_TPDO, DRIVE_OFFLINE) <= 4 * PERIOD + 1);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].quick_stops); /* it still hears */
-    slave.drive[2].is_mute = false;
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].quick_stops); /* it still hears */
+    twin.drive[2].node.is_mute = false;
     await(DRIVE_DISABLED, 5000);
     enable();
 }
@@ -1234,7 +1238,7 @@ static void test_poll_two_tpdos_lost_is_no_loss(void)
     come_up();
     enable();
     for (int i = 0; i < 20; i++) {
-        slave.drive[2].tpdo_drop = 2;
+        twin.drive[2].node.tpdo_drop = 2;
         cycles(4 * PERIOD);
     }
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
@@ -1244,7 +1248,7 @@ static void test_poll_heartbeat_lost_is_a_loss_in_time(void)
 {
     come_up();
     enable();
-    slave.drive[2].has_no_beat = true;
+    twin.drive[2].node.has_no_heartbeat = true;
     TEST_ASSERT_TRUE(cycles_to_loss(CIA402_LOST_HEARTBEAT, DRIVE_OFFLINE) <= 152);
 }
 
@@ -1252,11 +1256,11 @@ static void test_poll_boot_up_in_mid_run_is_a_loss_at_once(void)
 {
     come_up();
     enable();
-    cia402_slave_power(&slave, 2, true);
-    slave.drive[2].boot_us = now_us;
+    canopen_twin_power(&twin, 2, true);
+    twin.drive[2].node.boot_due_us = now_us;
     TEST_ASSERT_TRUE(cycles_to_loss(CIA402_REBOOTED, DRIVE_OFFLINE) <= 2);
     await(DRIVE_DISABLED, 3000);
-    TEST_ASSERT_EQUAL_UINT32(2, slave.drive[2].boots); /* not reset once more */
+    TEST_ASSERT_EQUAL_UINT32(2, twin.drive[2].boots); /* not reset once more */
     enable();
 }
 
@@ -1264,7 +1268,7 @@ static void test_poll_node_that_leaves_operational_is_lost(void)
 {
     come_up();
     enable();
-    slave.drive[2].nmt = 0x7F;
+    twin.drive[2].node.nmt = 0x7F;
     const unsigned count = cycles_to_loss(CIA402_LOST_TPDO, DRIVE_OFFLINE);
     TEST_ASSERT_TRUE(count <= 4 * PERIOD + 1);
 }
@@ -1273,10 +1277,10 @@ static void test_poll_torque_gone_by_itself_is_seen_in_a_period(void)
 {
     come_up();
     enable();
-    cia402_slave_drop(&slave, 2);
+    canopen_twin_drop(&twin, 2);
     TEST_ASSERT_TRUE(cycles_to_loss(0, DRIVE_DISABLED) <= PERIOD + 1);
     TEST_ASSERT_EQUAL_HEX32(CIA402_FELL_OUT, report(2).code);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].enabled); /* nobody enables it again by itself */
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].node.drive.enabled); /* nobody enables it again by itself */
 }
 
 /* One after the other, while nobody has stopped the rest yet: each is told. */
@@ -1284,22 +1288,22 @@ static void test_poll_torque_gone_from_several_drives_is_told_of_each(void)
 {
     come_up();
     enable();
-    cia402_slave_drop(&slave, 2);
+    canopen_twin_drop(&twin, 2);
     cycles(2 * PERIOD);
-    cia402_slave_drop(&slave, 5);
+    canopen_twin_drop(&twin, 5);
     cycles(2 * PERIOD);
     for (unsigned k = 0; k < AXES; k++) {
         TEST_ASSERT_EQUAL(k == 2 || k == 5 ? DRIVE_DISABLED : DRIVE_ENABLED, feedback[k].state);
     }
     TEST_ASSERT_EQUAL_HEX32(CIA402_FELL_OUT, report(5).code);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[5].enabled);
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[5].node.drive.enabled);
 }
 
 static void test_poll_fault_has_the_code_of_its_emergency(void)
 {
     come_up();
     enable();
-    cia402_slave_fault(&slave, 2, 0x3210);
+    canopen_twin_fault(&twin, 2, 0x3210);
     TEST_ASSERT_TRUE(cycles_to_loss(0x3210, DRIVE_FAULT) <= PERIOD + 1);
     TEST_ASSERT_EQUAL_STRING("over-voltage of the DC link", report(2).trouble);
 }
@@ -1308,9 +1312,9 @@ static void test_poll_fault_without_emergency_is_looked_up(void)
 {
     come_up();
     enable();
-    slave.drive[2].is_mute = true;
-    cia402_slave_fault(&slave, 2, 0x7305);
-    slave.drive[2].is_mute = false;
+    twin.drive[2].node.is_mute = true;
+    canopen_twin_fault(&twin, 2, 0x7305);
+    twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     cycles(20);
     TEST_ASSERT_EQUAL_HEX32(0x7305, feedback[2].fault_code);
@@ -1321,31 +1325,31 @@ static void test_poll_fault_without_any_code_is_a_fault_all_the_same(void)
 {
     come_up();
     enable();
-    slave.drive[2].is_deaf_sdo = true;
-    slave.drive[2].is_mute = true;
-    cia402_slave_fault(&slave, 2, 0x7305);
-    slave.drive[2].is_mute = false;
+    twin.drive[2].node.is_sdo_silent = true;
+    twin.drive[2].node.is_mute = true;
+    canopen_twin_fault(&twin, 2, 0x7305);
+    twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     cycles(1000);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(0x1000, feedback[2].fault_code);
-    slave.drive[2].is_deaf_sdo = false;
+    twin.drive[2].node.is_sdo_silent = false;
 }
 
 static void say(uint32_t id, uint8_t length, uint16_t code)
 {
     const can_frame_t frame = {.id = id, .length = length, .data = {(uint8_t)code, (uint8_t)(code >> 8)}};
-    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
 }
 
 static void test_poll_emergency_comes_before_what_is_looked_up(void)
 {
     come_up();
     enable();
-    slave.drive[2].is_deaf_sdo = true;
-    slave.drive[2].is_mute = true;
-    cia402_slave_fault(&slave, 2, 0x7305);
-    slave.drive[2].is_mute = false;
+    twin.drive[2].node.is_sdo_silent = true;
+    twin.drive[2].node.is_mute = true;
+    canopen_twin_fault(&twin, 2, 0x7305);
+    twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     say(0x83, 2, 0x4310); /* too short */
     say(0x83, 8, 0x0000);
@@ -1355,7 +1359,7 @@ static void test_poll_emergency_comes_before_what_is_looked_up(void)
     say(0x83, 8, 0x0000); /* "no error" comes with a reset, and says nothing about the fault */
     cycles(2);
     TEST_ASSERT_EQUAL_HEX32(0x3210, feedback[2].fault_code);
-    slave.drive[2].is_deaf_sdo = false;
+    twin.drive[2].node.is_sdo_silent = false;
     cycles(500);
     TEST_ASSERT_EQUAL_HEX32(0x3210, feedback[2].fault_code);
 }
@@ -1363,13 +1367,13 @@ static void test_poll_emergency_comes_before_what_is_looked_up(void)
 static void test_poll_fault_during_a_change_of_mode_is_looked_up_afterwards(void)
 {
     come_up();
-    slave.drive[2].is_deaf_sdo = true;
+    twin.drive[2].node.is_sdo_silent = true;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(20);
-    slave.drive[2].is_mute = true;
-    cia402_slave_fault(&slave, 2, 0x7305);
-    slave.drive[2].is_mute = false;
-    slave.drive[2].is_deaf_sdo = false;
+    twin.drive[2].node.is_mute = true;
+    canopen_twin_fault(&twin, 2, 0x7305);
+    twin.drive[2].node.is_mute = false;
+    twin.drive[2].node.is_sdo_silent = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     cycles(20);
     TEST_ASSERT_EQUAL_HEX32(0x7305, feedback[2].fault_code);
@@ -1380,10 +1384,10 @@ static void test_poll_fault_reaction_is_a_fault_at_once(void)
 {
     come_up();
     enable();
-    slave.drive[2].status = slave.drive[2].target_state = 0x0F;
+    twin.drive[2].node.drive.state = twin.drive[2].node.drive.next_state = TWIN_REACTION;
     TEST_ASSERT_TRUE(cycles_to_loss(0x1000, DRIVE_FAULT) <= PERIOD + 1);
     TEST_ASSERT_EQUAL_STRING("fault", report(2).phase);
-    cia402_slave_fault(&slave, 2, 0x5400);
+    say(0x83, 8, 0x5400);
     cycles(2 * PERIOD);
     TEST_ASSERT_EQUAL_HEX32(0x5400, feedback[2].fault_code);
 }
@@ -1397,13 +1401,13 @@ static void test_poll_drive_that_cannot_follow_is_stopped(void)
         config.mode = k_modes[i];
         come_up();
         enable();
-        slave.drive[2].status_set = 0x2000;
+        twin.drive[2].node.drive.bits_set = 0x2000;
         cycles(2 * PERIOD);
         TEST_ASSERT_EQUAL(k_modes[i] == CIA402_MODE_IP ? DRIVE_ENABLED : DRIVE_FAULT, feedback[2].state);
         TEST_ASSERT_EQUAL_HEX32(k_modes[i] == CIA402_MODE_IP ? 0 : 0x8611, feedback[2].fault_code);
         TEST_ASSERT_FALSE(drive_guard_is_found(&feedback[2].guard)); /* the drive says so itself */
         cycles(2 * PERIOD);
-        TEST_ASSERT_EQUAL_UINT32(k_modes[i] == CIA402_MODE_IP ? 0 : 1, slave.drive[2].quick_stops);
+        TEST_ASSERT_EQUAL_UINT32(k_modes[i] == CIA402_MODE_IP ? 0 : 1, twin.drive[2].quick_stops);
     }
 }
 
@@ -1412,27 +1416,27 @@ static void test_quick_stop_that_never_ends_ends_without_voltage(void)
 {
     come_up();
     enable();
-    slave.drive[2].is_stuck = true;
-    slave.drive[2].stuck_at = 0x07;
+    twin.drive[2].is_stuck = true;
+    twin.drive[2].stuck_at = 0x07;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(4900);
-    TEST_ASSERT_EQUAL_HEX16(0x0002, slave.drive[2].word);
+    TEST_ASSERT_EQUAL_HEX16(0x0002, canopen_twin_object(&twin, 2, 0x6040, 0)->value);
     TEST_ASSERT_EQUAL_STRING("stopping", report(2).phase);
     cycles(200);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, slave.drive[2].word);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, canopen_twin_object(&twin, 2, 0x6040, 0)->value);
 }
 
 static void test_request_reset_twice_is_one_edge(void)
 {
     come_up();
     enable();
-    cia402_slave_fault(&slave, 2, 0x2310);
+    canopen_twin_fault(&twin, 2, 0x2310);
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(2 * PERIOD);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(20 * PERIOD);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].resets);
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].resets);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
 }
 
@@ -1441,17 +1445,17 @@ static void test_request_reset_of_a_fault_that_goes_by_itself(void)
 {
     come_up();
     enable();
-    cia402_slave_fault(&slave, 2, 0x2310);
+    canopen_twin_fault(&twin, 2, 0x2310);
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
-    cia402_slave_drop(&slave, 2);
+    canopen_twin_drop(&twin, 2);
     await(DRIVE_DISABLED, 20 * PERIOD);
     cycles(10 * PERIOD);
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
-    slave.drive[2].is_mute = true;
-    cia402_slave_fault(&slave, 2, 0x7305);
-    slave.drive[2].is_mute = false;
+    twin.drive[2].node.is_mute = true;
+    canopen_twin_fault(&twin, 2, 0x7305);
+    twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     cycles(20);
     TEST_ASSERT_EQUAL_HEX32(0x7305, feedback[2].fault_code);
@@ -1461,25 +1465,25 @@ static void test_request_reset_is_one_edge_and_only_when_asked(void)
 {
     come_up();
     enable();
-    cia402_slave_fault(&slave, 2, 0x2310);
+    canopen_twin_fault(&twin, 2, 0x2310);
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(2000);
-    TEST_ASSERT_EQUAL_UINT32(0, slave.drive[2].resets);
+    TEST_ASSERT_EQUAL_UINT32(0, twin.drive[2].resets);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     await(DRIVE_DISABLED, 100);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].resets);
-    cia402_slave_fault(&slave, 2, 0x2310);
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].resets);
+    canopen_twin_fault(&twin, 2, 0x2310);
     cycles(500);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].resets);
-    TEST_ASSERT_EQUAL_UINT32(0, slave.drive[3].resets);
+    TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].resets);
+    TEST_ASSERT_EQUAL_UINT32(0, twin.drive[3].resets);
 }
 
 static void listen_to_silence(unsigned ms)
 {
     while (ms-- > 0) {
         now_us += CYCLE_US;
-        cia402_slave_step(&slave, now_us);
+        canopen_twin_step(&twin, now_us);
     }
 }
 
@@ -1487,7 +1491,7 @@ static void listen_to_silence(unsigned ms)
 
 static bool has_power(unsigned k)
 {
-    const uint16_t status = slave.drive[k].status;
+    const uint16_t status = twin.drive[k].node.drive.state;
     return status == 0x27 || status == 0x07 || status == 0x23;
 }
 
@@ -1514,7 +1518,7 @@ static void off_is_told_once_it_is_so(uint8_t every, unsigned step)
             (void)!cycle();
             follow_actual();
         }
-        slave.drive[3].tpdo_drop = i / step % 3; /* its answer is late */
+        twin.drive[3].node.tpdo_drop = i / step % 3; /* its answer is late */
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i / step % 2 == 0 ? DRIVES_DISABLE : DRIVES_QUICK_STOP));
         unsigned since = 0;
         for (unsigned n = 0; n < 400; n++) {
@@ -1541,6 +1545,22 @@ static void test_off_is_told_once_it_is_so_where_answers_are_rare(void)
     off_is_told_once_it_is_so(3, 5);
 }
 
+/* It hears what it is told, but nobody hears it. */
+static void test_off_is_not_told_of_a_drive_that_falls_silent_while_it_is_switched_on(void)
+{
+    for (unsigned i = 0; i < 60; i++) {
+        setUp();
+        come_up();
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+        cycles(i);
+        twin.drive[3].node.is_mute = true;
+        for (unsigned n = 0; n < 500; n++) {
+            (void)!cycle();
+            TEST_ASSERT_TRUE(feedback[3].is_energized || !has_power(3));
+        }
+    }
+}
+
 /* Nobody knows of a drive that was lost; one that has started again has no torque. */
 static void test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last(void)
 {
@@ -1549,8 +1569,8 @@ static void test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last(void)
     TEST_ASSERT_EQUAL_UINT(0, energized());
     await(DRIVE_DISABLED, 5000);
     enable();
-    slave.drive[2].is_mute = true;
-    cia402_slave_power(&slave, 4, false);
+    twin.drive[2].node.is_mute = true;
+    canopen_twin_power(&twin, 4, false);
     cycles(1000);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
@@ -1558,8 +1578,8 @@ static void test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(500);
     TEST_ASSERT_EQUAL_UINT(2, energized());
-    slave.drive[2].is_mute = false;
-    cia402_slave_power(&slave, 4, true);
+    twin.drive[2].node.is_mute = false;
+    canopen_twin_power(&twin, 4, true);
     while (feedback[4].is_energized) {
         (void)!cycle();
         TEST_ASSERT_TRUE(now_us < 60000000);
@@ -1576,8 +1596,8 @@ static void test_leave_drives_without_torque_forget_the_gateway(void)
     cia402_leave(&driver);
     listen_to_silence(1000);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[k].boots);
-        TEST_ASSERT_EQUAL_HEX32(0, cia402_slave_row(&slave, k, 0x603F, 0)->value); /* no 8130h */
+        TEST_ASSERT_EQUAL_UINT32(2, twin.drive[k].boots);
+        TEST_ASSERT_EQUAL_HEX32(0, canopen_twin_object(&twin, k, 0x603F, 0)->value); /* no 8130h */
     }
 }
 
@@ -1587,17 +1607,17 @@ static void test_leave_drives_with_torque_are_left_to_their_watchdogs(void)
     enable();
     cia402_leave(&driver);
     listen_to_silence(90); /* the last heartbeat is up to 50 ms old */
-    TEST_ASSERT_EQUAL_HEX16(0x27, slave.drive[0].status);
+    TEST_ASSERT_EQUAL_HEX16(0x27, twin.drive[0].node.drive.state);
     listen_to_silence(70);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].boots);
-        TEST_ASSERT_EQUAL_HEX16(0x08, slave.drive[k].status);
+        TEST_ASSERT_EQUAL_UINT32(1, twin.drive[k].boots);
+        TEST_ASSERT_EQUAL_HEX16(0x08, twin.drive[k].node.drive.state);
     }
 }
 
 static void test_leave_says_nothing_to_drives_that_are_not_there(void)
 {
-    cia402_slave_power(&slave, 6, false);
+    canopen_twin_power(&twin, 6, false);
     start();
     cycles(500);
     spy();
@@ -1715,9 +1735,9 @@ static void test_bus_without_echoes_is_trusted(void)
     spying.unconfirmed = NULL;
     await(DRIVE_DISABLED, 5000);
     enable();
-    const uint32_t before = slave.drive[0].setpoints;
+    const uint32_t before = twin.drive[0].setpoints;
     cycles(400);
-    TEST_ASSERT_UINT32_WITHIN(2, 100, slave.drive[0].setpoints - before);
+    TEST_ASSERT_UINT32_WITHIN(2, 100, twin.drive[0].setpoints - before);
 }
 
 /* From 1 to 5 and round; one that found no room is not counted. */
@@ -1726,8 +1746,8 @@ static void test_sync_counter_goes_round_without_a_gap(void)
     config.sync_counter = 5;
     config.is_sync_watched = true;
     come_up();
-    TEST_ASSERT_EQUAL_HEX32(5, cia402_slave_row(&slave, 3, 0x1019, 0)->value);
-    TEST_ASSERT_EQUAL_HEX32(PERIOD * CYCLE_US, cia402_slave_row(&slave, 3, 0x1006, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(5, canopen_twin_object(&twin, 3, 0x1019, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(PERIOD * CYCLE_US, canopen_twin_object(&twin, 3, 0x1006, 0)->value);
     enable();
     spy();
     uint8_t count = 0;
@@ -1818,9 +1838,9 @@ static void test_frames_for_others_are_not_heard(void)
                                  {.id = 0x703, .length = 1, .is_extended = true},
                                  {.id = 0x703, .length = 2},
                                  {.id = 0x283, .length = 8}};
-    const hal_can_t others = sim_can_hal(&slave.node);
+    const hal_can_t others = sim_can_hal(&twin.node);
     sim_can_bus_init(&bus, 0, NULL, 0);
-    cia402_slave_open(&slave, &bus);
+    canopen_twin_open(&twin, &bus);
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0)); /* without filters */
     TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, sim_can_hal(&node)));
     hal = cia402_hal(&driver);
@@ -1854,21 +1874,27 @@ static void test_owns_covers_every_frame_that_is_sent(void)
     }
 }
 
+/* Whatever was on its way when the bus went: the first of them leaves in the cycle of the restart, or in the next one. */
 static void test_bus_off_ended_syncs_go_on_at_their_period(void)
 {
-    come_up();
-    sim_can_set_state(&node, HAL_CAN_BUS_OFF);
-    const uint32_t restarts = driver.restarts;
-    for (unsigned n = 0; n < 4000 && driver.restarts == restarts; n++) {
-        (void)!cycle();
-    }
-    TEST_ASSERT_EQUAL_UINT32(restarts + 1, driver.restarts);
-    const uint32_t syncs = driver.syncs; /* the first of them left in the cycle of the restart */
-    cycles(PERIOD - 1);
-    TEST_ASSERT_EQUAL_UINT32(syncs, driver.syncs);
-    for (unsigned n = 1; n <= 5; n++) {
-        cycles(PERIOD);
-        TEST_ASSERT_EQUAL_UINT32(syncs + n, driver.syncs);
+    for (unsigned phase = 0; phase < PERIOD; phase++) {
+        setUp();
+        come_up();
+        cycles(phase);
+        sim_can_set_state(&node, HAL_CAN_BUS_OFF);
+        const uint32_t restarts = driver.restarts;
+        const uint32_t syncs = driver.syncs;
+        for (unsigned n = 0; n < 4000 && driver.restarts == restarts; n++) {
+            (void)!cycle();
+        }
+        TEST_ASSERT_EQUAL_UINT32(restarts + 1, driver.restarts);
+        cycles(1);
+        TEST_ASSERT_EQUAL_UINT32(syncs + 1, driver.syncs);
+        cycles(PERIOD - 2);
+        for (unsigned n = 1; n <= 5; n++) {
+            TEST_ASSERT_EQUAL_UINT32(syncs + n, driver.syncs);
+            cycles(PERIOD);
+        }
     }
 }
 
@@ -1884,7 +1910,7 @@ static void test_bus_off_keeps_silent_until_the_drives_have_stopped(void)
     cycles(400);
     TEST_ASSERT_EQUAL_UINT32(restarts, driver.restarts);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_HEX16(0x08, slave.drive[k].status); /* 6007h = 1: they found out by themselves */
+        TEST_ASSERT_EQUAL_HEX16(0x08, twin.drive[k].node.drive.state); /* 6007h = 1: they found out by themselves */
     }
     cycles(4000);
     TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
@@ -1892,7 +1918,7 @@ static void test_bus_off_keeps_silent_until_the_drives_have_stopped(void)
     await(DRIVE_DISABLED, 200);
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
+        TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
     }
 }
 
@@ -2050,8 +2076,8 @@ static void test_bus_whose_queue_is_full_now_and_then_hinders_nothing(void)
     TEST_ASSERT_TRUE(bus.sends < 22000 && driver.refused > 0);
     TEST_ASSERT_UINT32_WITHIN(5, 50, driver.sets - sets);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 80);
-        TEST_ASSERT_EQUAL_HEX32(0x607A0020, cia402_slave_row(&slave, k, 0x1600, 2)->value);
+        TEST_ASSERT_TRUE(twin.drive[k].largest_step <= 80);
+        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, k, 0x1600, 2)->value);
     }
 }
 
@@ -2062,7 +2088,7 @@ static void test_request_quick_stop_goes_with_the_set_that_is_due(void)
     enable();
     for (unsigned i = 0; i <= PERIOD && !driver.is_open; i++) {
         now_us += CYCLE_US;
-        cia402_slave_step(&slave, now_us);
+        canopen_twin_step(&twin, now_us);
         (void)!drives_poll(hal, now_us, feedback);
     }
     TEST_ASSERT_TRUE(driver.is_open);
@@ -2085,7 +2111,7 @@ static void test_send_slow_bus_refuses_instead_of_queueing(void)
     unsigned refused = 0;
     for (int i = 0; i < 10; i++) {
         now_us += CYCLE_US;
-        cia402_slave_step(&slave, now_us);
+        canopen_twin_step(&twin, now_us);
         (void)!drives_poll(hal, now_us, feedback);
         refused += drives_send(hal, now_us, setpoint_q32) == HV_ERR_AGAIN;
         TEST_ASSERT_TRUE(node.tx_count <= 1 + AXES + 1);
@@ -2120,9 +2146,9 @@ static void test_request_home_finds_the_zero_of_all_and_returns_without_a_jump(v
         await(DRIVE_ENABLED, 5000);
         for (unsigned k = 0; k < AXES; k++) {
             TEST_ASSERT_TRUE(feedback[k].is_homed);
-            TEST_ASSERT_EQUAL_INT32(k == absolute ? 100000 + 1000 * (int32_t)k : 500, slave.drive[k].position);
-            TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
-            TEST_ASSERT_EQUAL_INT8(8, slave.drive[k].mode);
+            TEST_ASSERT_EQUAL_INT32(k == absolute ? 100000 + 1000 * (int32_t)k : 500, canopen_twin_position(&twin, k));
+            TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
+            TEST_ASSERT_EQUAL_INT8(8, twin.drive[k].node.drive.mode);
         }
         TEST_ASSERT_TRUE(now_us - begin_us < (turn != 0 ? 1000000u : 400000u));
         TEST_ASSERT_TRUE(now_us - begin_us > (turn != 0 ? 300000u : 50000u));
@@ -2131,13 +2157,13 @@ static void test_request_home_finds_the_zero_of_all_and_returns_without_a_jump(v
 
 static void test_request_home_one_failure_stops_all(void)
 {
-    slave.drive[3].is_homing_failing = true;
+    twin.drive[3].node.drive.is_homing_broken = true;
     home(false);
     (void)cycles_until(3, DRIVE_FAULT, 3000);
     TEST_ASSERT_EQUAL_HEX32(0x8613, feedback[3].fault_code);
     cycles(50);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].status != 0x27);
+        TEST_ASSERT_TRUE(twin.drive[k].node.drive.state != 0x27);
     }
 }
 
@@ -2147,12 +2173,12 @@ static void test_request_home_again_is_not_over_before_it_begins(void)
     await(DRIVE_ENABLED, 5000);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     await(DRIVE_DISABLED, 200);
-    slave.drive[0].position = 7000;
+    canopen_twin_place(&twin, 0, 7000);
     cycles(2 * PERIOD);
     enable();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
     await(DRIVE_ENABLED, 5000);
-    TEST_ASSERT_EQUAL_INT32(500, slave.drive[0].position);
+    TEST_ASSERT_EQUAL_INT32(500, canopen_twin_position(&twin, 0));
 }
 
 /* "Done" that never was "not done" may be that of the last homing: it is believed after a while. */
@@ -2160,8 +2186,8 @@ static void test_request_home_of_a_drive_that_is_there_already_ends(void)
 {
     home(false);
     await(DRIVE_ENABLED, 5000);
-    slave.drive[3].homing_us = 0;
-    slave.drive[3].status_set = 0x1400;
+    twin.drive[3].node.drive.home = twin.drive[3].node.drive.motor.actual;
+    twin.drive[3].node.drive.bits_set = 0x1400;
     const uint64_t begin_us = now_us;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
     await(DRIVE_ENABLED, 5000);
@@ -2172,12 +2198,12 @@ static void test_request_home_of_a_drive_that_is_there_already_ends(void)
 static void test_request_home_after_one_that_failed(void)
 {
     home(false);
-    slave.drive[3].status_set = 0x2000;
-    for (unsigned i = 0; i < 1000 && !slave.drive[3].is_homing; i++) {
+    twin.drive[3].node.drive.bits_set = 0x2000;
+    for (unsigned i = 0; i < 1000 && !is_homing(3); i++) {
         (void)!cycle();
     }
-    TEST_ASSERT_TRUE(slave.drive[3].is_homing);
-    slave.drive[3].status_set = 0;
+    TEST_ASSERT_TRUE(is_homing(3));
+    twin.drive[3].node.drive.bits_set = 0;
     await(DRIVE_ENABLED, 5000);
     TEST_ASSERT_TRUE(feedback[3].is_homed);
 }
@@ -2186,7 +2212,7 @@ static void test_power_lost_means_that_the_zero_is_lost(void)
 {
     home(false);
     await(DRIVE_ENABLED, 5000);
-    cia402_slave_power(&slave, 1, true);
+    canopen_twin_power(&twin, 1, true);
     (void)cycles_until(1, DRIVE_OFFLINE, 100);
     TEST_ASSERT_FALSE(feedback[1].is_homed);
     TEST_ASSERT_TRUE(feedback[0].is_homed);
@@ -2207,19 +2233,19 @@ static void test_any_trouble_at_any_time_moves_nothing(void)
         cycles((unsigned)rand() % 120);
         switch (rand() % 5) {
         case 0:
-            cia402_slave_fault(&slave, axis, 0x5000);
+            canopen_twin_fault(&twin, axis, 0x5000);
             break;
         case 1:
-            cia402_slave_power(&slave, axis, true);
+            canopen_twin_power(&twin, axis, true);
             break;
         case 2:
-            slave.drive[axis].is_mute = true;
+            twin.drive[axis].node.is_mute = true;
             break;
         case 3:
-            cia402_slave_drop(&slave, axis);
+            canopen_twin_drop(&twin, axis);
             break;
         default:
-            slave.drive[axis].nmt = 0x04;
+            twin.drive[axis].node.nmt = 0x04;
             break;
         }
         for (int i = 0; i < 600; i++) {
@@ -2233,8 +2259,8 @@ static void test_any_trouble_at_any_time_moves_nothing(void)
             }
         }
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
-            TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, slave.drive[k].position);
+            TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
+            TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, canopen_twin_position(&twin, k));
         }
     }
 }
@@ -2302,7 +2328,7 @@ static void contradict(unsigned row)
 
 static void test_init_contradictions_are_refused(void)
 {
-    const hal_can_t can = sim_can_hal(&slave.node);
+    const hal_can_t can = sim_can_hal(&twin.node);
     TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, can));
     TEST_ASSERT_EQUAL(HV_ERR_ARG, cia402_init(&driver, &config, (hal_can_t){NULL, NULL}));
     for (unsigned row = 0; row < 18; row++) {
@@ -2350,8 +2376,8 @@ static const struct {
 
 static void show(unsigned drive, size_t row, bool is_shown)
 {
-    slave.drive[drive].status_set = is_shown ? k_watches[row].set : 0;
-    slave.drive[drive].status_clear = is_shown ? k_watches[row].clear : 0;
+    twin.drive[drive].node.drive.bits_set = is_shown ? k_watches[row].set : 0;
+    twin.drive[drive].node.drive.bits_clear = is_shown ? k_watches[row].clear : 0;
 }
 
 static void test_watch_what_stops_is_a_fault_within_three_periods(void)
@@ -2428,7 +2454,7 @@ static void test_watch_mode_left_in_motion_is_a_fault(void)
     config.reaction[CIA402_WATCH_MODE] = CIA402_STOP;
     come_up();
     enable();
-    slave.drive[4].mode = 1;
+    twin.drive[4].node.drive.mode = 1;
     TEST_ASSERT_TRUE(cycles_until(4, DRIVE_FAULT, 100) <= 3 * PERIOD);
     TEST_ASSERT_EQUAL_HEX32(CIA402_LEFT_MODE, feedback[4].fault_code);
 }
@@ -2450,7 +2476,7 @@ static void test_watch_bits_that_a_drive_does_not_have_are_not_missed(void)
     config.reaction[CIA402_WATCH_FOLLOWING] = CIA402_STOP;
     config.reaction[CIA402_WATCH_VOLTAGE] = CIA402_STOP;
     config.power_timeout_ms = 900; /* without bit 12 it is believed after half a second */
-    slave.drive[1].status_clear = CIA402_STATUS_BIT12 | CIA402_STATUS_VOLTAGE;
+    twin.drive[1].node.drive.bits_clear = CIA402_STATUS_BIT12 | CIA402_STATUS_VOLTAGE;
     come_up();
     enable();
     cycles(1000);
@@ -2469,7 +2495,7 @@ static void test_watch_drive_under_local_control_is_not_enabled(void)
     TEST_ASSERT_EQUAL_HEX32(CIA402_REMOTE_OFF, feedback[5].fault_code);
     cycles(200);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].enabled);
+        TEST_ASSERT_EQUAL_UINT32(0, twin.drive[k].node.drive.enabled);
     }
     show(5, 1, false);
     cycles(100);
@@ -2491,7 +2517,7 @@ static void test_watch_limit_while_homing_stops_nothing(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
     cycles(2);
     for (unsigned i = 0; i < 3000 && feedback[3].state == DRIVE_HOMING; i++) {
-        show(3, 3, driver.stage == CIA402_STAGE_HOMING && slave.drive[3].is_homing);
+        show(3, 3, driver.stage == CIA402_STAGE_HOMING && is_homing(3));
         follow_actual();
         (void)!cycle();
     }
@@ -2504,7 +2530,7 @@ static void tell_error(unsigned drive, uint16_t code)
 {
     const can_frame_t frame = {
         .id = 0x81u + drive, .length = 8, .data = {(uint8_t)code, (uint8_t)(code >> 8), 0x11, 1, 2, 3, 4, 5}};
-    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
     cycles(2);
 }
 
@@ -2532,12 +2558,12 @@ static void test_emergency_is_kept_over_a_loss_and_over_with_a_boot(void)
 {
     come_up();
     tell_error(2, 0x3220);
-    cia402_slave_power(&slave, 2, false);
+    canopen_twin_power(&twin, 2, false);
     (void)cycles_until(2, DRIVE_OFFLINE, 100);
     cycles(1000);
     TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
     TEST_ASSERT_FALSE(report(2).emergency.is_over);
-    cia402_slave_power(&slave, 2, true);
+    canopen_twin_power(&twin, 2, true);
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
     TEST_ASSERT_TRUE(report(2).emergency.is_over);
@@ -2548,7 +2574,7 @@ static void test_emergency_of_a_drive_that_stays_preoperational_is_the_reason(vo
 {
     start();
     while (driver.axis[4].phase != CIA402_REFUSED) {
-        slave.drive[4].nmt = slave.drive[4].nmt == 5 ? 0x7F : slave.drive[4].nmt;
+        twin.drive[4].node.nmt = twin.drive[4].node.nmt == 5 ? 0x7F : twin.drive[4].node.nmt;
         if (driver.axis[4].phase == CIA402_STARTING && (report(4).error == NULL || report(4).emergency.is_over)) {
             tell_error(4, 0x8100);
         }
@@ -2564,8 +2590,8 @@ static void test_emergency_that_leaves_operational_is_the_reason(void)
 {
     come_up();
     tell_error(1, 0x8100);
-    slave.drive[1].nmt = 0x7F;
-    slave.drive[1].beat_us = 0;
+    twin.drive[1].node.nmt = 0x7F;
+    twin.drive[1].node.beat_due_us = 0;
     (void)cycles_until(1, DRIVE_OFFLINE, 60);
     TEST_ASSERT_EQUAL_HEX32(CIA402_LEFT_OPERATIONAL, feedback[1].fault_code);
     TEST_ASSERT_EQUAL_HEX32(0x8100, report(1).detail_code);
@@ -2577,8 +2603,8 @@ static void test_rare_answers_carry_a_motion(void)
 {
     config.answer_every = 4;
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(4, cia402_slave_row(&slave, 3, 0x1800, 2)->value);
-    TEST_ASSERT_EQUAL_UINT32(0, cia402_slave_row(&slave, 3, 0x1800, 6)->value);
+    TEST_ASSERT_EQUAL_UINT32(4, canopen_twin_object(&twin, 3, 0x1800, 2)->value);
+    TEST_ASSERT_EQUAL_UINT32(0, canopen_twin_object(&twin, 3, 0x1800, 6)->value);
     enable();
     for (unsigned i = 0; i < 100; i++) {
         for (unsigned k = 0; k < AXES; k++) {
@@ -2588,8 +2614,8 @@ static void test_rare_answers_carry_a_motion(void)
         TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
         TEST_ASSERT_TRUE(now_us - feedback[3].actual_us <= 5 * PERIOD * CYCLE_US);
     }
-    TEST_ASSERT_INT_WITHIN(2000, 128000, slave.drive[3].position);
-    TEST_ASSERT_TRUE(slave.drive[3].largest_step <= 250);
+    TEST_ASSERT_INT_WITHIN(2000, 128000, canopen_twin_position(&twin, 3));
+    TEST_ASSERT_TRUE(twin.drive[3].largest_step <= 250);
 }
 
 static void test_rare_answers_that_stay_away_are_a_loss_after_three_turns(void)
@@ -2598,11 +2624,11 @@ static void test_rare_answers_that_stay_away_are_a_loss_after_three_turns(void)
     come_up();
     enable();
     for (int i = 0; i < 5; i++) {
-        slave.drive[2].tpdo_drop = 2;
+        twin.drive[2].node.tpdo_drop = 2;
         cycles(16 * PERIOD);
     }
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
-    slave.drive[2].is_mute = true;
+    twin.drive[2].node.is_mute = true;
     const unsigned count = cycles_to_loss(CIA402_LOST_TPDO, DRIVE_OFFLINE);
     TEST_ASSERT_TRUE(count <= 13 * PERIOD + 1 && count > 8 * PERIOD);
 }
@@ -2615,7 +2641,7 @@ static void test_rare_answers_of_two_drives_are_told_apart(void)
     const uint64_t begin_us = now_us;
     while (feedback[2].state != DRIVE_FAULT && now_us - begin_us < 400000) {
         const can_frame_t frame = {.id = 0x183, .length = 7, .data = {0x37, 0x12, 0xB0, 0x8E, 1, 0, 8}};
-        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
         cycles(4 * PERIOD);
     }
     TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, feedback[2].fault_code);
@@ -2631,7 +2657,7 @@ static void test_rare_answers_take_turns(void)
     come_up();
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(k % 4 + 1, cia402_slave_row(&slave, k, 0x1800, 6)->value);
+        TEST_ASSERT_EQUAL_UINT32(k % 4 + 1, canopen_twin_object(&twin, k, 0x1800, 6)->value);
     }
     for (unsigned i = 0; i < 40 * PERIOD; i++) {
         uint64_t before_us[AXES];
@@ -2641,7 +2667,7 @@ static void test_rare_answers_take_turns(void)
         cycles(1);
         for (unsigned k = 0; k < AXES; k++) {
             answers[k % 4] += feedback[k].actual_us != before_us[k];
-            TEST_ASSERT_TRUE(feedback[k].actual_us == before_us[k] || slave.sync_number % 4 == (k + 1) % 4);
+            TEST_ASSERT_TRUE(feedback[k].actual_us == before_us[k] || twin.sync_number % 4 == (k + 1) % 4);
         }
     }
     TEST_ASSERT_EQUAL_UINT32(20, answers[0]);
@@ -2652,12 +2678,12 @@ static void test_rare_answers_need_1800_06_for_their_turns_only(void)
 {
     config.answer_every = 4;
     config.sync_counter = 9; /* no whole turns */
-    cia402_slave_row(&slave, 3, 0x1800, 6)->is_missing = true;
+    canopen_twin_object(&twin, 3, 0x1800, 6)->is_missing = true;
     come_up();
     setUp();
     config.answer_every = 4;
     config.sync_counter = 8;
-    cia402_slave_row(&slave, 3, 0x1800, 6)->is_missing = true;
+    canopen_twin_object(&twin, 3, 0x1800, 6)->is_missing = true;
     TEST_ASSERT_EQUAL_HEX32(0x180006, refusal_of(3).object);
 }
 
@@ -2683,9 +2709,9 @@ static void tell(uint8_t values, uint8_t every)
     config.telemetry_every = every;
     config.axis[1].scale.num = -1000;
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].torque = (int16_t)(250 - 100 * (int)k);
-        slave.drive[k].lag = 1500;
-        slave.drive[k].inputs = 0x80010005;
+        canopen_twin_force(&twin, k, 0x6077, 0, (uint16_t)(250 - 100 * (int)k));
+        canopen_twin_force(&twin, k, 0x60F4, 0, 1500);
+        canopen_twin_force(&twin, k, 0x60FD, 0, 0x80010005);
     }
 }
 
@@ -2694,12 +2720,12 @@ static void test_telemetry_of_all_kinds_takes_two_pdos(void)
     tell(DRIVE_HAS_TORQUE | DRIVE_HAS_LAG | DRIVE_HAS_INPUTS, 1);
     come_up();
     cycles(3 * PERIOD);
-    TEST_ASSERT_EQUAL_HEX32(0x40000284, cia402_slave_row(&slave, 3, 0x1801, 1)->value);
-    TEST_ASSERT_EQUAL_UINT32(2, cia402_slave_row(&slave, 3, 0x1A01, 0)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60770010, cia402_slave_row(&slave, 3, 0x1A01, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60F40020, cia402_slave_row(&slave, 3, 0x1A01, 2)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x40000384, cia402_slave_row(&slave, 3, 0x1802, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, cia402_slave_row(&slave, 3, 0x1A02, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x40000284, canopen_twin_object(&twin, 3, 0x1801, 1)->value);
+    TEST_ASSERT_EQUAL_UINT32(2, canopen_twin_object(&twin, 3, 0x1A01, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60770010, canopen_twin_object(&twin, 3, 0x1A01, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60F40020, canopen_twin_object(&twin, 3, 0x1A01, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x40000384, canopen_twin_object(&twin, 3, 0x1802, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, canopen_twin_object(&twin, 3, 0x1A02, 1)->value);
     const drive_telemetry_t plain = report(6).telemetry;
     TEST_ASSERT_EQUAL_UINT8(7, plain.has);
     TEST_ASSERT_EQUAL_INT32(-350, plain.torque_permille);
@@ -2715,9 +2741,9 @@ static void test_telemetry_of_one_kind_comes_at_its_rate(void)
 {
     tell(DRIVE_HAS_INPUTS, 5);
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(5, cia402_slave_row(&slave, 2, 0x1801, 2)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, cia402_slave_row(&slave, 2, 0x1A01, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0xC0000383, cia402_slave_row(&slave, 2, 0x1802, 1)->value);
+    TEST_ASSERT_EQUAL_UINT32(5, canopen_twin_object(&twin, 2, 0x1801, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, canopen_twin_object(&twin, 2, 0x1A01, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0xC0000383, canopen_twin_object(&twin, 2, 0x1802, 1)->value);
     cycles(6 * PERIOD);
     const uint64_t first_us = report(2).telemetry.at_us;
     cycles(5 * PERIOD);
@@ -2729,7 +2755,7 @@ static void test_telemetry_of_one_kind_comes_at_its_rate(void)
 static void test_telemetry_that_a_drive_cannot_map_is_named(void)
 {
     tell(DRIVE_HAS_TORQUE, 1);
-    cia402_slave_row(&slave, 4, 0x1A01, 1)->refusal = 0x06040041;
+    canopen_twin_object(&twin, 4, 0x1A01, 1)->refusal = 0x06040041;
     const drive_report_t r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, r.code);
     TEST_ASSERT_EQUAL_HEX32(0x1A0101, r.object);
@@ -2743,8 +2769,8 @@ static void test_telemetry_that_was_not_asked_for_counts_for_nothing(void)
     TEST_ASSERT_EQUAL_UINT32(3 + 9 * AXES,
                              cia402_filters(&config, filter)); /* a master's, its RPDO of ours, and those of the nodes */
     come_up();
-    TEST_ASSERT_EQUAL_HEX32(0xC0000283, cia402_slave_row(&slave, 2, 0x1801, 1)->value);
-    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    TEST_ASSERT_EQUAL_HEX32(0xC0000283, canopen_twin_object(&twin, 2, 0x1801, 1)->value);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
     cycles(2);
     TEST_ASSERT_EQUAL_UINT8(0, report(2).telemetry.has);
 }
@@ -2754,7 +2780,7 @@ static void test_telemetry_of_another_length_counts_for_nothing(void)
     const can_frame_t frame = {.id = 0x283, .length = 3, .data = {1, 2, 3}};
     tell(DRIVE_HAS_TORQUE, 200);
     come_up();
-    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
     cycles(2);
     TEST_ASSERT_EQUAL_UINT8(0, report(2).telemetry.has);
 }
@@ -2773,13 +2799,13 @@ static void test_telemetry_rate_is_checked(void)
 /* The other one answers too, from somewhere else. */
 static void answer_twice(unsigned drive, unsigned periods, unsigned most)
 {
-    uint32_t syncs = slave.syncs;
+    uint32_t syncs = twin.syncs;
     while (periods > 0 && most-- > 0) {
         cycles(1);
-        if (slave.syncs != syncs && slave.drive[drive].nmt == 5) {
+        if (twin.syncs != syncs && twin.drive[drive].node.nmt == 5) {
             const can_frame_t frame = {.id = 0x181u + drive, .length = 7, .data = {0x40, 0x02, 1, 2, 3, 0, 8}};
-            TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
-            syncs = slave.syncs;
+            TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
+            syncs = twin.syncs;
             periods--;
         }
     }
@@ -2789,13 +2815,13 @@ static void test_twice_in_motion_is_a_fault_within_three_periods(void)
 {
     come_up();
     enable();
-    for (const uint32_t syncs = slave.syncs; slave.syncs == syncs;) { /* it answers SYNC, as the drive does */
+    for (const uint32_t syncs = twin.syncs; twin.syncs == syncs;) { /* it answers SYNC, as the drive does */
         cycles(1);
     }
     const uint64_t begin_us = now_us;
     while (feedback[2].state != DRIVE_FAULT && now_us - begin_us < 100000) {
         const can_frame_t frame = {.id = 0x183, .length = 7, .data = {0x37, 0x12, 1, 2, 3, 0, 8}};
-        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
         cycles(PERIOD);
     }
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
@@ -2818,11 +2844,11 @@ static void test_twice_at_the_start_is_refused_before_anybody_is_enabled(void)
 static void test_twice_two_boot_ups_at_once_are_refused(void)
 {
     start();
-    for (unsigned i = 0; i < 200 && slave.drive[1].boots == 0; i++) {
+    for (unsigned i = 0; i < 200 && twin.drive[1].boots == 0; i++) {
         cycles(1);
     }
     cycles(2);
-    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &(can_frame_t){.id = 0x702, .length = 1}));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &(can_frame_t){.id = 0x702, .length = 1}));
     cycles(3000);
     TEST_ASSERT_EQUAL_STRING("refused", report(1).phase);
     TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, report(1).code);
@@ -2834,17 +2860,17 @@ static void test_twice_single_repeated_or_late_answers_are_none(void)
     come_up();
     enable();
     for (unsigned i = 0; i < 10; i++) {
-        const uint32_t position = (uint32_t)slave.drive[2].position;
+        const uint32_t position = (uint32_t)canopen_twin_position(&twin, 2);
         const can_frame_t frame = {.id = 0x183,
                                    .length = 7,
                                    .data = {0x37, 0x12, (uint8_t)position, (uint8_t)(position >> 8), (uint8_t)(position >> 16),
                                             (uint8_t)(position >> 24), 8}};
-        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
         cycles(2000);
-        slave.drive[2].tpdo_drop = 2; /* two are missing, and come after all */
+        twin.drive[2].node.tpdo_drop = 2; /* two are missing, and come after all */
         cycles(2 * PERIOD);
-        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
-        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
         cycles(2000);
     }
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
@@ -2944,6 +2970,7 @@ int main(void)
     RUN_TEST(test_request_reset_is_one_edge_and_only_when_asked);
     RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
     RUN_TEST(test_off_is_told_once_it_is_so_where_answers_are_rare);
+    RUN_TEST(test_off_is_not_told_of_a_drive_that_falls_silent_while_it_is_switched_on);
     RUN_TEST(test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last);
     RUN_TEST(test_leave_drives_without_torque_forget_the_gateway);
     RUN_TEST(test_leave_drives_with_torque_are_left_to_their_watchdogs);

@@ -7,10 +7,10 @@
 
 #include <string.h>
 
-#include "cia402_slave.h"
+#include "canopen_twin.h"
 #include "unity.h"
 
-#define AXES      CIA402_SLAVES
+#define AXES      CANOPEN_TWIN_DRIVES
 #define CYCLE_US  1000u
 #define PERIOD    4u
 #define LISTEN_MS 100u
@@ -20,7 +20,7 @@ static sim_can_bus_t bus;
 static sim_can_t node;
 static sim_can_t other; /* the other master's */
 static sim_can_t spy;   /* hears all */
-static cia402_slave_t slave;
+static canopen_twin_t twin;
 static cia402_config_t config;
 static cia402_t driver;
 static drives_t hal;
@@ -32,7 +32,7 @@ static void cycles(unsigned count)
 {
     while (count-- > 0) {
         now_us += CYCLE_US;
-        cia402_slave_step(&slave, now_us);
+        canopen_twin_step(&twin, now_us);
         (void)!drives_poll(hal, now_us, feedback);
         for (unsigned k = 0; k < AXES; k++) {
             setpoint_q32[k] = feedback[k].state == DRIVE_ENABLED ? setpoint_q32[k] : feedback[k].actual_mm_q32;
@@ -77,7 +77,7 @@ void setUp(void)
     now_us = 5000000;
     memset(feedback, 0, sizeof feedback);
     sim_can_bus_init(&bus, 0, NULL, 0);
-    cia402_slave_open(&slave, &bus);
+    canopen_twin_open(&twin, &bus);
     config = (cia402_config_t){.axes = AXES,
                                .master_node = 127,
                                .mode = CIA402_MODE_CSP,
@@ -236,7 +236,7 @@ static void test_while_no_drive_is_known_it_listens_again(void)
 /* One that comes later than the others is not left out. */
 static void test_in_the_middle_of_bringing_up_nobody_is_enabled(void)
 {
-    cia402_slave_power(&slave, 4, false);
+    canopen_twin_power(&twin, 4, false);
     start();
     for (unsigned i = 0; i < 5000 && feedback[0].state != DRIVE_DISABLED; i++) {
         cycles(1);
@@ -248,7 +248,7 @@ static void test_in_the_middle_of_bringing_up_nobody_is_enabled(void)
         TEST_ASSERT_EQUAL(k == 4 ? DRIVE_OFFLINE : DRIVE_FAULT, feedback[k].state);
         TEST_ASSERT_TRUE(drive_has_other_master(&feedback[k]));
     }
-    cia402_slave_power(&slave, 4, true);
+    canopen_twin_power(&twin, 4, true);
     cycles(3000);
     TEST_ASSERT_NOT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
@@ -375,7 +375,7 @@ static void test_a_stopped_node_stays_so_until_somebody_resets(void)
     say(0x000, 2, 0x02, 3);
     cycles(10000);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
-    TEST_ASSERT_EQUAL_UINT8(0x04, slave.drive[2].nmt);
+    TEST_ASSERT_EQUAL_UINT8(0x04, twin.drive[2].node.nmt);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     await(DRIVE_DISABLED);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
@@ -392,10 +392,10 @@ static void test_a_stopped_node_stays_so_while_others_have_torque(void)
     TEST_ASSERT_TRUE(feedback[1].is_energized);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(2000);
-    TEST_ASSERT_EQUAL_UINT8(0x04, slave.drive[2].nmt);
+    TEST_ASSERT_EQUAL_UINT8(0x04, twin.drive[2].node.nmt);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     cycles(2000);
-    TEST_ASSERT_EQUAL_UINT8(0x04, slave.drive[2].nmt);
+    TEST_ASSERT_EQUAL_UINT8(0x04, twin.drive[2].node.nmt);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     await(DRIVE_DISABLED);
 }
@@ -413,7 +413,7 @@ static void test_nodes_that_are_all_stopped_come_back_with_a_reset(void)
 static void test_nodes_that_are_stopped_at_the_start_come_up(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].nmt = 0x04;
+        twin.drive[k].node.nmt = 0x04;
     }
     start();
     await(DRIVE_DISABLED);
