@@ -91,7 +91,6 @@ void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sam
         self->low_q32[axis] = self->high_q32[axis] = sample_q32[axis];
     }
     self->watched = 0;
-    self->change = 0;
     self->is_off = false;
     self->window = 1;
     self->mean_points = 0;

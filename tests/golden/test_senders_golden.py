@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_senders_golden.py - everyday senders give the same set-points, bit for bit: what changes a number anywhere in following shows here.
+"""test_senders_golden.py - everyday senders give the same set-points, bit for bit: a change of following that one of them shows changes its line.
 
 usage: test_senders_golden.py --heaved PROGRAM [--update]
 

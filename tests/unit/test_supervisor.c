@@ -42,8 +42,14 @@ void tearDown(void) {}
  * as it was silence       0 no   1 yes   = as it was action        h home  t settle  r rise  f follow  s stop  y stay  o off  x
  * fault stop  v serve  e e-stop   - none
  * "." = not for this state: nothing changes and it is counted.   "-" = nothing to do and it is not counted. */
-static const char k_states[] = "OHSRNEDTVFX";
-static const char k_actions[] = "-htrfsyoxve";
+static const char k_states[STATES + 1] = {
+    [STATE_OFF] = 'O',     [STATE_HOMING] = 'H',  [STATE_SETTLED] = 'S', [STATE_RISING] = 'R',
+    [STATE_NEUTRAL] = 'N', [STATE_ENGAGED] = 'E', [STATE_HOLD] = 'D',    [STATE_SETTLING] = 'T',
+    [STATE_SERVICE] = 'V', [STATE_FAULT] = 'F',   [STATE_ESTOP] = 'X'};
+static const char k_actions[] = {
+    [ACTION_NONE] = '-',       [ACTION_HOME] = 'h',  [ACTION_SETTLE] = 't', [ACTION_RISE] = 'r',
+    [ACTION_FOLLOW] = 'f',     [ACTION_STOP] = 's',  [ACTION_STAY] = 'y',   [ACTION_OFF] = 'o',
+    [ACTION_FAULT_STOP] = 'x', [ACTION_SERVE] = 'v', [ACTION_ESTOP] = 'e',  [ACTION_ESTOP + 1] = '\0'};
 
 typedef enum { ANY, NO, YES } tri_t;
 
@@ -285,9 +291,11 @@ static bool is_up_by_silence(const supervisor_t *sup)
 static void check_invariants(const supervisor_t *before, event_t event, const supervisor_view_t *view, action_t action,
                              const supervisor_t *after)
 {
-    static const action_t k_entry[STATES] = {ACTION_OFF,   ACTION_HOME,       ACTION_STAY, ACTION_RISE,
-                                             ACTION_STAY,  ACTION_FOLLOW,     ACTION_STOP, ACTION_SETTLE,
-                                             ACTION_SERVE, ACTION_FAULT_STOP, ACTION_ESTOP};
+    static const action_t k_entry[STATES] = {
+        [STATE_OFF] = ACTION_OFF,          [STATE_HOMING] = ACTION_HOME,     [STATE_SETTLED] = ACTION_STAY,
+        [STATE_RISING] = ACTION_RISE,      [STATE_NEUTRAL] = ACTION_STAY,    [STATE_ENGAGED] = ACTION_FOLLOW,
+        [STATE_HOLD] = ACTION_STOP,        [STATE_SETTLING] = ACTION_SETTLE, [STATE_SERVICE] = ACTION_SERVE,
+        [STATE_FAULT] = ACTION_FAULT_STOP, [STATE_ESTOP] = ACTION_ESTOP};
     const state_t from = before->state, to = after->state;
     char text[120];
     snprintf(text, sizeof text, "%s + %s -> %s", state_name(from), event_name(event), state_name(to));
@@ -415,7 +423,11 @@ static const char *needs_by_hand(const supervisor_t *sup)
                                        "F ........"
                                        "X ........";
     const bool is_homing_held = sup->state == STATE_HOLD && sup->interrupted == STATE_HOMING;
-    return is_homing_held ? "F.UU...." : k_needs + 10 * (strchr(k_states, letter(sup->state)) - k_states) + 2;
+    const char *row = k_needs;
+    while (*row != letter(sup->state)) {
+        row += 10;
+    }
+    return is_homing_held ? "F.UU...." : row + 2;
 }
 
 static bool is_needed(char set, uint32_t permit)
