@@ -113,6 +113,9 @@ static hv_status_t local_receive(void *ctx, can_frame_t *out, uint64_t *rx_time_
             self->unconfirmed -= self->unconfirmed > 0 ? 1 : 0;
             continue;
         }
+        if (self->state == HAL_CAN_BUS_OFF) {
+            continue; /* it hears nothing */
+        }
         if ((packet.frame.can_id & CAN_ERR_FLAG) != 0) {
             receive_report(self, &packet.frame, out);
         } else {
