@@ -20,7 +20,7 @@
 
 #define NAME_SIZE  48
 #define PLACES_MAX 64
-#define SEEN_MAX   900
+#define SEEN_MAX   1900
 
 #define STREAM_ERROR 0x20 /* _IO_ERR_SEEN of glibc */
 
