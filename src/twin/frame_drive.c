@@ -52,7 +52,7 @@ int64_t frame_drive_count(const frame_drive_t *self)
 
 bool frame_drive_is_enabled(const frame_drive_t *self)
 {
-    return self->is_powered && (self->state == FRAME_DRIVE_TORQUE || self->state == FRAME_DRIVE_HOMING);
+    return self->is_powered && self->motor->has_torque;
 }
 
 /* --- What it sends --- */
@@ -240,7 +240,10 @@ static void torque_on(frame_drive_t *self)
 void frame_drive_fault(frame_drive_t *self, uint32_t code)
 {
     self->fault_code = code;
-    torque_off(self, FRAME_DRIVE_FAULT);
+    self->state = FRAME_DRIVE_FAULT;
+    if (!self->is_torque_kept) {
+        torque_off(self, FRAME_DRIVE_FAULT);
+    }
 }
 
 void frame_drive_drop(frame_drive_t *self)
@@ -284,16 +287,26 @@ static void home(frame_drive_t *self)
     motor_travel(self->motor, self->home, self->usual_speed / HOMING_PART);
 }
 
+/* What had no torque before has none again. */
+static void leave_homing(frame_drive_t *self)
+{
+    self->state = FRAME_DRIVE_TORQUE;
+    if (self->before_homing == FRAME_DRIVE_OFF) {
+        torque_off(self, FRAME_DRIVE_OFF);
+    }
+}
+
 static void command(frame_drive_t *self, canraw_command_t which)
 {
     switch (which) {
     case CANRAW_STOP:
+        if (self->state == FRAME_DRIVE_HOMING) {
+            leave_homing(self);
+        }
         (void)motor_stop(self->motor, self->usual_speed / STOP_S);
         return;
     case CANRAW_DISABLE:
-        if (self->state != FRAME_DRIVE_FAULT) {
-            torque_off(self, FRAME_DRIVE_OFF);
-        }
+        torque_off(self, self->state == FRAME_DRIVE_FAULT ? FRAME_DRIVE_FAULT : FRAME_DRIVE_OFF);
         return;
     case CANRAW_RESET:
         if (self->state == FRAME_DRIVE_FAULT && !self->is_broken) {
@@ -397,24 +410,14 @@ void frame_drive_hear(frame_drive_t *self, const can_frame_t *frame, uint64_t no
     receive(self, frame);
 }
 
-/* Homing is over. What had no torque before has none again. */
 static void end_homing(frame_drive_t *self)
 {
-    if (self->is_homing_broken) {
-        self->has_homing_failed = true;
-        self->state = self->before_homing;
-        if (self->map->homing_failed.mask == 0) {
-            return; /* it cannot tell: heaved waits, and finds that it takes too long */
-        }
+    leave_homing(self);
+    self->is_homed = !self->is_homing_broken;
+    self->has_homing_failed = self->is_homing_broken;
+    self->origin = self->is_homed ? 0 : self->origin;
+    if (self->has_homing_failed && self->map->homing_failed.mask != 0) { /* else heaved finds that it takes too long */
         frame_drive_fault(self, CANRAW_FAULT_HOMING);
-        return;
-    }
-    self->origin = 0;
-    self->is_homed = true;
-    if (self->before_homing == FRAME_DRIVE_OFF) {
-        torque_off(self, FRAME_DRIVE_OFF);
-    } else {
-        self->state = FRAME_DRIVE_TORQUE;
     }
 }
 

@@ -22,6 +22,7 @@ typedef struct frame_drive {
     bool is_broken;        /**< the cause of its fault stays */
     bool is_homing_broken; /**< homing ends with an error */
     bool is_stuck;         /**< its alive counter stands still */
+    bool is_torque_kept;   /**< a fault leaves it its torque until that is taken from it */
     uint32_t late_us;
     uint32_t lost, damaged;
 

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "canraw_drives.h"
 #include "canraw_maps.h"
-#include "canraw_slave.h"
 #include "canopen_twin.h"
 #include "heave/cia402.h"
 #include "modbus_maps.h"
@@ -101,13 +101,13 @@ static bool has_torque_sim(uint8_t axis)
 
 static sim_can_bus_t canraw_bus;
 static sim_can_t canraw_node;
-static canraw_slave_t canraw_slave;
+static canraw_drives_t canraw_drives;
 static canraw_map_t canraw_map;
 static canraw_t canraw;
 
 static void settle_canraw(uint64_t until_us)
 {
-    canraw_slave_step(&canraw_slave, until_us);
+    canraw_drives_step(&canraw_drives, until_us);
 }
 
 /* On the bus, and long enough for the drives to say that they are homed. */
@@ -115,12 +115,12 @@ static void start_canraw(drives_t *drives, bool is_rich)
 {
     hal_can_filter_t filter[CANRAW_FILTERS_MAX];
     sim_can_bus_init(&canraw_bus, 0, NULL, 0);
-    canraw_slave_open(&canraw_slave, &canraw_bus, is_rich);
     canraw_map = is_rich ? canraw_maps_rich() : canraw_maps_plain();
     canraw_map.period_us = is_rich ? CYCLE_US : 2 * CYCLE_US;
+    canraw_drives_open(&canraw_drives, &canraw_bus, canraw_map);
     for (uint8_t k = 0; k < AXES; k++) {
         const int32_t mm = 100 + 10 * k;
-        canraw_slave.drive[k].position = is_rich ? CANRAW_SLAVE_RICH_ZERO - (mm * 10000 + 1) / 3 : mm * 2000;
+        canraw_drives_place(&canraw_drives, k, is_rich ? CANRAW_DRIVES_RICH_ZERO - (mm * 10000 + 1) / 3 : mm * 2000);
     }
     const uint32_t filters = canraw_filters(&canraw_map, filter);
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&canraw_node, &canraw_bus, filter, filters));
@@ -148,24 +148,23 @@ static bool open_canraw_rich(drives_t *drives)
 
 static void fault_canraw(uint8_t axis)
 {
-    canraw_slave.drive[axis].is_faulty = true;
+    frame_drive_fault(&canraw_drives.twin[axis], 1);
 }
 
 static void power_canraw(uint8_t axis, bool is_on)
 {
-    canraw_slave.drive[axis].is_on = is_on;
+    canraw_drives.twin[axis].is_cut = !is_on;
 }
 
 static bool has_torque_canraw(uint8_t axis)
 {
-    return canraw_slave.drive[axis].is_enabled;
+    return frame_drive_is_enabled(&canraw_drives.twin[axis]);
 }
 
 static void glide_canraw(uint32_t for_us)
 {
-    canraw_slave.is_holding_on_stop = true;
-    canraw_slave.glide_takes_us = for_us;
-    canraw_slave.glide_counts = 60;
+    canraw_drives.is_holding_on_stop = true;
+    canraw_drives.glide_takes_us = for_us;
 }
 
 /* CANopen drives, behind the CiA 402 driver. */

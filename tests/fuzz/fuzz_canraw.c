@@ -10,8 +10,8 @@
 #include <string.h>
 
 #include "can_tap.h"
+#include "canraw_drives.h"
 #include "canraw_maps.h"
-#include "canraw_slave.h"
 #include "drive_run.h"
 
 #define CYCLE_US    1000u
@@ -48,7 +48,7 @@ typedef struct {
     drive_run_t run;
     sim_can_bus_t bus;
     sim_can_t node;
-    canraw_slave_t slave;
+    canraw_drives_t slave;
     can_tap_t tap;
     canraw_t driver;
     unsigned dialect;
@@ -71,7 +71,7 @@ static bool is_rich(const world_t *self)
     return self->dialect == RICH || self->dialect == SEALED;
 }
 
-/* --- Numbers, by the register lists of canraw_slave.h --- */
+/* --- Numbers, by the register lists of canraw_drives.h --- */
 
 static int64_t le32(const uint8_t *data)
 {
@@ -86,7 +86,7 @@ static int64_t be32(const uint8_t *data)
 static int64_t counts_of(const world_t *self, q32_t mm_q32)
 {
     const bool has_status = is_rich(self);
-    return drive_run_counts(mm_q32, has_status ? -10000 : 6000, has_status ? CANRAW_SLAVE_RICH_ZERO : 0);
+    return drive_run_counts(mm_q32, has_status ? -10000 : 6000, has_status ? CANRAW_DRIVES_RICH_ZERO : 0);
 }
 
 /* True where counts are those of a position, but for one. */
@@ -140,7 +140,7 @@ static void see_rich(world_t *self, unsigned k, const can_frame_t *frame)
 {
     const unsigned more = self->dialect == SEALED ? 2 : 0;
     FUZZ_REQUIRE(more == 0 ||
-                 (frame->length > 2 && canraw_slave_crc(frame->data, frame->length - 1u) == frame->data[frame->length - 1]));
+                 (frame->length > 2 && canraw_drives_crc(frame->data, frame->length - 1u) == frame->data[frame->length - 1]));
     if (frame->data[0] == 0x10) {
         FUZZ_REQUIRE(frame->length == 5 + more);
         see_setpoint(self, k, be32(frame->data + 1));
@@ -175,7 +175,7 @@ static bool is_position(world_t *self, unsigned k, const can_frame_t *frame)
 {
     seen_t *seen = &self->seen[k];
     if (self->dialect == SEALED) {
-        if (frame->length < 8 || frame->data[0] != 0x30 || canraw_slave_crc(frame->data, 7) != frame->data[7]) {
+        if (frame->length < 8 || frame->data[0] != 0x30 || canraw_drives_crc(frame->data, 7) != frame->data[7]) {
             return false;
         }
         const bool is_new = !seen->has_counter || seen->counter != frame->data[6];
@@ -285,7 +285,7 @@ static void poll(world_t *self)
 {
     drive_run_t *run = &self->run;
     run->now_us += CYCLE_US;
-    canraw_slave_step(&self->slave, run->now_us);
+    canraw_drives_step(&self->slave, run->now_us);
     const hv_status_t status = drives_poll(run->drives, run->now_us, run->feedback);
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         check_drive(self, k);
@@ -377,11 +377,10 @@ static void bring_up(unsigned i, unsigned dialect)
     self->dialect = dialect;
     self->run.now_us = 5000000;
     sim_can_bus_init(&self->bus, 0, NULL, 0);
-    canraw_slave_open(&self->slave, &self->bus, is_rich(self));
-    self->slave.is_sealed = dialect == SEALED;
+    canraw_drives_open(&self->slave, &self->bus, m_map[dialect]);
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         const int32_t mm = 20 + 10 * (int32_t)k;
-        self->slave.drive[k].position = is_rich(self) ? CANRAW_SLAVE_RICH_ZERO - mm * 10000 / 3 : mm * 2000;
+        canraw_drives_place(&self->slave, k, is_rich(self) ? CANRAW_DRIVES_RICH_ZERO - mm * 10000 / 3 : mm * 2000);
     }
     FUZZ_REQUIRE(sim_can_open(&self->node, &self->bus, filter, canraw_filters(&m_map[dialect], filter)) == HV_OK);
     self->tap = (can_tap_t){.inner = sim_can_hal(&self->node), .watcher = self, .sent = see_sent, .received = see_received};
@@ -435,7 +434,7 @@ static can_frame_t reply(const world_t *world, const record_t *record)
     if (world->dialect == SEALED) {
         frame.length = 8;
         frame.data[6] = record->data[6];
-        frame.data[7] = (uint8_t)(canraw_slave_crc(frame.data, 7) ^ (record->kind % 16 == 4 ? 1u << record->data[7] % 8 : 0));
+        frame.data[7] = (uint8_t)(canraw_drives_crc(frame.data, 7) ^ (record->kind % 16 == 4 ? 1u << record->data[7] % 8 : 0));
     }
     return frame;
 }
@@ -483,25 +482,35 @@ static can_frame_t strange_frame(const world_t *world, const record_t *record)
     return frame;
 }
 
+/* Plain drives have no word for torque and faults: one that fails stands. */
 static void disturb(world_t *self, const record_t *record)
 {
-    canraw_slave_drive_t *drive = &self->slave.drive[record->drive];
+    const unsigned k = record->drive;
+    frame_drive_t *drive = &self->slave.twin[k];
     const bool is_so = record->data[0] % 2 != 0;
     switch (record->kind % 6) {
     case 0:
-        drive->is_faulty = is_so;
+        self->slave.motor[k].is_jammed = is_so && !is_rich(self);
+        if (is_rich(self) && is_so) {
+            frame_drive_fault(drive, 1);
+        } else if (is_rich(self)) {
+            canraw_drives_command(&self->slave, k, CANRAW_RESET);
+        }
         break;
     case 1:
-        drive->is_on = is_so;
+        drive->is_cut = !is_so;
         break;
     case 2:
-        drive->is_enabled = is_so;
+        if (is_rich(self)) {
+            canraw_drives_command(&self->slave, k, is_so ? CANRAW_ENABLE : CANRAW_DISABLE);
+        }
         break;
     case 3:
-        drive->is_dumb = is_so;
+        drive->is_mute = is_so;
         break;
     case 4:
-        drive->is_failing = is_so;
+        drive->is_homing_broken = is_so;
+        self->slave.sent[k].homing_takes_us = record->data[0] % 4 < 2 ? 30000 : UINT32_MAX;
         break;
     default:
         drive->is_homed = is_so;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * canraw_maps.h - maps of the two dialects of canraw_slave.h, as data.
+ * canraw_maps.h - maps of the two dialects of canraw_drives.h, as data.
  */
 #ifndef CANRAW_MAPS_H
 #define CANRAW_MAPS_H

@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: MIT
- * test_canraw.c - the raw CAN driver byte by byte, against drives written from the bytes alone: set-points, homing, feedback that
+ * test_canraw.c - the raw CAN driver byte by byte, against drives that know the bytes alone: set-points, homing, feedback that
  * is lost, a bus that stalls, stop frames, maps that contradict themselves.
  */
 #include "heave/canraw.h"
 
 #include <string.h>
 
+#include "canraw_drives.h"
 #include "canraw_maps.h"
-#include "canraw_slave.h"
 #include "unity.h"
 
-#define AXES     CANRAW_SLAVES
+#define AXES     DRIVES_MAX
 #define CYCLE_US 1000u
 #define MM(x)    ((q32_t)(x)*Q32_ONE)
 
 static sim_can_bus_t bus;
 static sim_can_t node;
-static canraw_slave_t slave;
+static canraw_drives_t slave;
 static canraw_map_t map;
 static canraw_t driver;
 static drives_t hal;
@@ -27,7 +27,7 @@ static q32_t setpoint_q32[DRIVES_MAX];
 static hv_status_t poll_once(void)
 {
     now_us += CYCLE_US;
-    canraw_slave_step(&slave, now_us);
+    canraw_drives_step(&slave, now_us);
     return drives_poll(hal, now_us, feedback);
 }
 
@@ -75,10 +75,10 @@ static void open_with(const sim_can_fault_t *plan, uint32_t planned, bool is_ric
     hal_can_filter_t filter[CANRAW_FILTERS_MAX];
     now_us = 1000000;
     sim_can_bus_init(&bus, 0, plan, planned);
-    canraw_slave_open(&slave, &bus, is_rich);
+    canraw_drives_open(&slave, &bus, is_rich ? canraw_maps_rich() : canraw_maps_plain());
     for (unsigned k = 0; k < AXES; k++) {
         const int mm = 20 + 10 * (int)k;
-        slave.drive[k].position = is_rich ? CANRAW_SLAVE_RICH_ZERO - mm * 10000 / 3 : mm * 2000;
+        canraw_drives_place(&slave, k, is_rich ? CANRAW_DRIVES_RICH_ZERO - mm * 10000 / 3 : mm * 2000);
     }
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, filter, canraw_filters(&map, filter)));
     TEST_ASSERT_EQUAL(HV_OK, canraw_init(&driver, &map, sim_can_hal(&node)));
@@ -97,7 +97,7 @@ static void open_sealed(void)
 {
     map = canraw_maps_sealed();
     open_with(NULL, 0, true);
-    slave.is_sealed = true;
+    slave.map = canraw_maps_sealed();
 }
 
 void setUp(void)
@@ -134,17 +134,15 @@ static void test_enable_drives_that_set_points_enable(void)
     map = canraw_maps_rich();
     map.command[CANRAW_ENABLE] = (canraw_frame_t){.length = 0};
     open_with(NULL, 0, true);
-    for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_enabled_by_target = true;
-    }
+    slave.map.command[CANRAW_ENABLE].length = 0;
     await(DRIVE_DISABLED, 100);
     cycles(100);
-    TEST_ASSERT_EQUAL_UINT32(0, slave.drive[0].setpoints);
+    TEST_ASSERT_EQUAL_UINT32(0, slave.sent[0].setpoints);
     enable();
     cycles(100);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].is_enabled);
-        TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
+        TEST_ASSERT_TRUE(frame_drive_is_enabled(&slave.twin[k]));
+        TEST_ASSERT_EQUAL_INT32(0, slave.sent[k].largest_step);
     }
 }
 
@@ -155,7 +153,9 @@ static void test_enable_drives_that_are_enabled_by_themselves(void)
     map.command[CANRAW_ENABLE] = (canraw_frame_t){.length = 0};
     open_with(NULL, 0, true);
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_enabled = k != 4;
+        if (k != 4) {
+            canraw_drives_command(&slave, k, CANRAW_ENABLE);
+        }
     }
     await(DRIVE_DISABLED, 100);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
@@ -165,7 +165,7 @@ static void test_enable_drives_that_are_enabled_by_themselves(void)
     }
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[3].state);
     TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[4].state);
-    slave.drive[4].is_enabled = true;
+    canraw_drives_command(&slave, 4, CANRAW_ENABLE);
     await(DRIVE_ENABLED, 100);
 }
 
@@ -180,9 +180,9 @@ static void test_sealed_frames_have_no_gap_and_no_wrong_check_byte(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(10);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].frames > 900);
-        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].gaps);
-        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
+        TEST_ASSERT_TRUE(slave.sent[k].frames > 900);
+        TEST_ASSERT_EQUAL_UINT32(0, slave.sent[k].gaps);
+        TEST_ASSERT_EQUAL_UINT32(1, slave.sent[k].stops);
     }
     TEST_ASSERT_EQUAL_UINT32(0, driver.strange);
 }
@@ -194,11 +194,11 @@ static void test_sealed_frame_that_finds_no_room_is_no_gap(void)
         const sim_can_fault_t plan[] = {{SIM_CAN_FULL, at, 0}};
         map = canraw_maps_sealed();
         open_with(plan, 1, true);
-        slave.is_sealed = true;
+        slave.map = canraw_maps_sealed();
         enable();
         cycles(100);
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].gaps);
+            TEST_ASSERT_EQUAL_UINT32(0, slave.sent[k].gaps);
         }
     }
 }
@@ -209,7 +209,7 @@ static void test_reply_with_a_wrong_check_byte_is_not_believed(void)
     enable();
     const q32_t before_q32 = feedback[2].actual_mm_q32;
     can_frame_t frame = {.id = 0x18FF0202, .is_extended = true, .length = 8, .data = {0x30, 0x01, 0, 0, 0, 0, 0x77}};
-    frame.data[7] = (uint8_t)(canraw_slave_crc(frame.data, 7) ^ 0x10);
+    frame.data[7] = (uint8_t)(canraw_drives_crc(frame.data, 7) ^ 0x10);
     const uint32_t strange = driver.strange;
     TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
     sim_can_bus_step(&bus, now_us);
@@ -223,14 +223,14 @@ static void test_drive_whose_counter_stands_still_is_lost_and_stays_so(void)
 {
     open_sealed();
     enable();
-    slave.drive[4].is_stuck = true;
+    slave.twin[4].is_stuck = true;
     cycles(2 * ((int)map.offline_periods + 2));
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
     for (unsigned i = 0; i < 200; i++) {
         (void)!cycle();
         TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
     }
-    slave.drive[4].is_stuck = false;
+    slave.twin[4].is_stuck = false;
     cycles(10);
     TEST_ASSERT_TRUE(feedback[4].state != DRIVE_OFFLINE);
 }
@@ -266,7 +266,7 @@ static void test_frames_of_the_plain_dialect_byte_for_byte(void)
     static const uint8_t k_position[8] = {0x00, 0x15};
     static const uint8_t k_homing[8] = {0x00, 0x12};
     unsigned seen = 0;
-    slave.drive[0].is_homed = false;
+    slave.twin[0].is_homed = false;
     enable();
     cycles(10);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
@@ -295,7 +295,7 @@ static void test_frames_of_the_plain_dialect_byte_for_byte(void)
 static void test_setpoint_at_full_stroke_byte_for_byte(void)
 {
     static const uint8_t k_full[8] = {0x01, 0x05, 0xC0, 0x27, 0x09, 0x00, 0xB8, 0x0B};
-    slave.drive[2].position = 600000;
+    canraw_drives_place(&slave, 2, 600000);
     enable();
     slave.logged = 0;
     cycles(4);
@@ -320,9 +320,9 @@ static void test_speed_field_is_that_of_the_setpoints(void)
         setpoint_q32[1] -= MM(1) / 100; /* the magnitude counts */
         cycle();
     }
-    TEST_ASSERT_EQUAL_UINT16(600, slave.drive[0].speed);
-    TEST_ASSERT_EQUAL_UINT16(60, slave.drive[1].speed);
-    TEST_ASSERT_EQUAL_UINT16(7, slave.drive[2].speed);
+    TEST_ASSERT_EQUAL_UINT16(600, slave.sent[0].speed);
+    TEST_ASSERT_EQUAL_UINT16(60, slave.sent[1].speed);
+    TEST_ASSERT_EQUAL_UINT16(7, slave.sent[2].speed);
 }
 
 static void test_speed_field_with_a_sign_has_the_direction(void)
@@ -339,9 +339,9 @@ static void test_speed_field_with_a_sign_has_the_direction(void)
         setpoint_q32[1] -= MM(1) / 100;
         cycle();
     }
-    TEST_ASSERT_EQUAL_INT16(600, (int16_t)slave.drive[0].speed);
-    TEST_ASSERT_EQUAL_INT16(-60, (int16_t)slave.drive[1].speed);
-    TEST_ASSERT_EQUAL_INT16(7, (int16_t)slave.drive[2].speed);
+    TEST_ASSERT_EQUAL_INT16(600, (int16_t)slave.sent[0].speed);
+    TEST_ASSERT_EQUAL_INT16(-60, (int16_t)slave.sent[1].speed);
+    TEST_ASSERT_EQUAL_INT16(7, (int16_t)slave.sent[2].speed);
 }
 
 /* Beyond all numbers there and back, with a drive that counts the other way round. */
@@ -360,8 +360,8 @@ static void test_speed_that_no_number_tells_is_at_the_end_of_its_field(void)
     for (unsigned i = 0; i < 2; i++) {
         setpoint_q32[3] = -setpoint_q32[3];
         cycles(2);
-        canraw_slave_step(&slave, now_us);
-        TEST_ASSERT_EQUAL_INT16(k_speeds[i], (int16_t)slave.drive[3].speed);
+        canraw_drives_step(&slave, now_us);
+        TEST_ASSERT_EQUAL_INT16(k_speeds[i], (int16_t)slave.sent[3].speed);
     }
 }
 
@@ -384,16 +384,16 @@ static void test_setpoints_go_out_once_per_period_and_only_while_enabled(void)
 {
     await(DRIVE_DISABLED, 100);
     cycles(50);
-    TEST_ASSERT_EQUAL_UINT32(0, slave.drive[0].setpoints);
+    TEST_ASSERT_EQUAL_UINT32(0, slave.sent[0].setpoints);
     enable();
-    const uint32_t before = slave.drive[3].setpoints;
+    const uint32_t before = slave.sent[3].setpoints;
     cycles(100);
-    TEST_ASSERT_EQUAL_UINT32(50, slave.drive[3].setpoints - before);
+    TEST_ASSERT_EQUAL_UINT32(50, slave.sent[3].setpoints - before);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     cycle();
-    const uint32_t after = slave.drive[3].setpoints;
+    const uint32_t after = slave.sent[3].setpoints;
     cycles(100);
-    TEST_ASSERT_EQUAL_UINT32(after, slave.drive[3].setpoints);
+    TEST_ASSERT_EQUAL_UINT32(after, slave.sent[3].setpoints);
 }
 
 static void test_on_change_sends_nothing_twice(void)
@@ -402,13 +402,13 @@ static void test_on_change_sends_nothing_twice(void)
     open_with(NULL, 0, false);
     enable();
     cycles(4);
-    const uint32_t before = slave.drive[0].setpoints;
+    const uint32_t before = slave.sent[0].setpoints;
     cycles(100);
-    TEST_ASSERT_EQUAL_UINT32(before, slave.drive[0].setpoints);
+    TEST_ASSERT_EQUAL_UINT32(before, slave.sent[0].setpoints);
     setpoint_q32[0] += MM(1) / 2000;
     cycles(3);
-    TEST_ASSERT_EQUAL_UINT32(before + 1, slave.drive[0].setpoints);
-    TEST_ASSERT_EQUAL_INT32(40001, slave.drive[0].target);
+    TEST_ASSERT_EQUAL_UINT32(before + 1, slave.sent[0].setpoints);
+    TEST_ASSERT_EQUAL_INT32(40001, slave.sent[0].target);
 }
 
 /* A frame that hangs on the wire: the next set waits for it, and no set is ever queued behind another. */
@@ -429,7 +429,7 @@ static void test_gate_the_next_set_waits_for_the_last(void)
     }
     TEST_ASSERT_TRUE(waits > 0 && driver.refused == waits);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 2 * 200 + 1);
+        TEST_ASSERT_TRUE(slave.sent[k].largest_step <= 2 * 200 + 1);
     }
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
 }
@@ -449,7 +449,7 @@ static void test_queue_full_at_every_frame_of_a_set_makes_no_larger_step(void)
         }
         TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 2 * 200 + 1);
+            TEST_ASSERT_TRUE(slave.sent[k].largest_step <= 2 * 200 + 1);
         }
     }
 }
@@ -472,12 +472,12 @@ static void test_bus_without_partner_is_gone_after_three_periods_and_returns(voi
     TEST_ASSERT_EQUAL(HV_ERR_IO, drives_send(hal, now_us, setpoint_q32));
     TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_QUICK_STOP));
     TEST_ASSERT_TRUE(driver.restarts > 0);
-    const uint32_t setpoints = slave.drive[0].setpoints;
-    const bool was_homed = slave.drive[0].is_homed;
+    const uint32_t setpoints = slave.sent[0].setpoints;
+    const bool was_homed = slave.twin[0].is_homed;
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&slave.node, &bus, NULL, 0));
     await(DRIVE_DISABLED, 2000);
-    TEST_ASSERT_EQUAL_UINT32(setpoints, slave.drive[0].setpoints); /* no stale set-point */
-    TEST_ASSERT_TRUE(was_homed && slave.drive[0].is_homed);
+    TEST_ASSERT_EQUAL_UINT32(setpoints, slave.sent[0].setpoints); /* no stale set-point */
+    TEST_ASSERT_TRUE(was_homed && slave.twin[0].is_homed);
     enable();
 }
 
@@ -540,9 +540,9 @@ static void test_bus_without_echoes_is_trusted(void)
     blind.unconfirmed = NULL;
     driver.can.ops = &blind;
     enable();
-    const uint32_t before = slave.drive[3].setpoints;
+    const uint32_t before = slave.sent[3].setpoints;
     cycles(100);
-    TEST_ASSERT_EQUAL_UINT32(50, slave.drive[3].setpoints - before);
+    TEST_ASSERT_EQUAL_UINT32(50, slave.sent[3].setpoints - before);
     driver.can.ops = sim_can_hal(&node).ops;
 }
 
@@ -696,7 +696,7 @@ static void test_frames_that_are_no_replies_change_nothing(void)
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
     setUp();
     node.filters = 0;
-    slave.drive[2].is_dumb = true;
+    slave.twin[2].is_mute = true;
     for (unsigned i = 0; i < 20; i++) {
         say(0x583, true, 6, k_far);
         cycles(1);
@@ -710,7 +710,7 @@ static void test_position_beyond_all_millimetres_is_not_taken(void)
 {
     map.axis[4].scale = (counts_scale_t){1, 1, 0};
     open_with(NULL, 0, false);
-    slave.drive[4].position = INT32_MAX;
+    canraw_drives_place(&slave, 4, INT32_MAX);
     cycles(50);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
     TEST_ASSERT_FALSE(feedback[4].has_actual);
@@ -723,7 +723,7 @@ static void test_position_beyond_all_millimetres_is_not_taken(void)
 static void test_silent_drive_is_offline_after_its_periods_and_gets_nothing_more(void)
 {
     enable();
-    slave.drive[4].is_dumb = true;
+    slave.twin[4].is_mute = true;
     int silent = 0;
     while (feedback[4].state == DRIVE_ENABLED && silent < 1000) {
         (void)!cycle();
@@ -732,11 +732,11 @@ static void test_silent_drive_is_offline_after_its_periods_and_gets_nothing_more
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
     TEST_ASSERT_TRUE(silent >= 5 * 2 - 2 && silent <= 5 * 2 + 2);
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[3].state);
-    const uint32_t setpoints = slave.drive[4].setpoints;
+    const uint32_t setpoints = slave.sent[4].setpoints;
     cycles(20);
-    TEST_ASSERT_EQUAL_UINT32(setpoints, slave.drive[4].setpoints);
+    TEST_ASSERT_EQUAL_UINT32(setpoints, slave.sent[4].setpoints);
     TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
-    slave.drive[4].is_dumb = false;
+    slave.twin[4].is_mute = false;
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[4].state);
     TEST_ASSERT_TRUE(feedback[4].is_homed);
@@ -763,7 +763,7 @@ static void test_following_error_stops_that_axis_and_it_hears_nothing_more(void)
 {
     enable();
     cycles(4);
-    const uint32_t setpoints = slave.drive[1].setpoints;
+    const uint32_t setpoints = slave.sent[1].setpoints;
     setpoint_q32[1] += MM(1) + 1;
     cycles(3);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
@@ -771,8 +771,8 @@ static void test_following_error_stops_that_axis_and_it_hears_nothing_more(void)
     TEST_ASSERT_TRUE(feedback[1].guard.jump_q32 > 0);
     TEST_ASSERT_EQUAL_INT64(MM(1) + 1, feedback[1].guard.jump_q32);
     TEST_ASSERT_EQUAL_INT64(MM(1), feedback[1].guard.allowed_q32);
-    TEST_ASSERT_TRUE(slave.drive[1].setpoints <= setpoints + 1);
-    TEST_ASSERT_EQUAL_INT32(60000, slave.drive[1].target);
+    TEST_ASSERT_TRUE(slave.sent[1].setpoints <= setpoints + 1);
+    TEST_ASSERT_EQUAL_INT32(60000, slave.sent[1].target);
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     (void)!cycle();
@@ -791,17 +791,17 @@ static void test_setpoint_that_no_frame_can_carry_is_a_fault_and_is_not_sent(voi
         map.axis[1].following_max_q32 = 0;
         map.axis[1].scale = i == 0 ? (counts_scale_t){2000, 1, 0} : (counts_scale_t){INT32_MIN, 1, 0};
         open_with(NULL, 0, false);
-        slave.drive[1].position = 0;
+        canraw_drives_place(&slave, 1, 0);
         enable();
         cycles(4);
-        const uint32_t setpoints = slave.drive[1].setpoints;
+        const uint32_t setpoints = slave.sent[1].setpoints;
         setpoint_q32[1] = i == 0 ? -MM(1) : INT64_MIN;
         cycles(4);
         TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
         TEST_ASSERT_EQUAL_HEX32(CANRAW_FAULT_FOLLOWING, feedback[1].fault_code);
         TEST_ASSERT_TRUE(feedback[1].guard.jump_q32 > 0);
-        TEST_ASSERT_TRUE(slave.drive[1].setpoints <= setpoints + 1);
-        TEST_ASSERT_EQUAL_INT32(0, slave.drive[1].target);
+        TEST_ASSERT_TRUE(slave.sent[1].setpoints <= setpoints + 1);
+        TEST_ASSERT_EQUAL_INT32(0, slave.sent[1].target);
         TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
     }
 }
@@ -809,10 +809,8 @@ static void test_setpoint_that_no_frame_can_carry_is_a_fault_and_is_not_sent(voi
 /* A drive that does not move while its set-points do. */
 static void test_lag_beyond_the_window_is_a_following_error(void)
 {
-    slave.drive[2].is_on = true;
     enable();
-    slave.drive[2].is_homing = true; /* works on, follows nothing */
-    slave.drive[2].is_failing = true;
+    slave.motor[2].is_jammed = true;
     int steps = 0;
     while (feedback[2].state == DRIVE_ENABLED && steps < 1000) {
         setpoint_q32[2] += MM(1) / 10;
@@ -828,7 +826,7 @@ static void test_lag_that_is_not_watched_is_no_fault(void)
     map.axis[2].following_max_q32 = 0;
     open_with(NULL, 0, false);
     enable();
-    slave.drive[2].is_homing = slave.drive[2].is_failing = true;
+    slave.motor[2].is_jammed = true;
     for (int i = 0; i < 300; i++) {
         setpoint_q32[2] += MM(1) / 10;
         TEST_ASSERT_EQUAL(HV_OK, cycle());
@@ -840,18 +838,18 @@ static void test_lag_that_is_not_watched_is_no_fault(void)
 
 static void test_homing_ends_when_the_drive_says_so_and_the_new_position_is_known(void)
 {
-    slave.drive[5].is_homed = false;
+    slave.twin[5].is_homed = false;
     enable();
     TEST_ASSERT_FALSE(feedback[5].is_homed);
     TEST_ASSERT_TRUE(feedback[4].is_homed);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
-    const uint32_t setpoints = slave.drive[5].setpoints;
-    while (slave.drive[5].is_homing || slave.drive[5].position != 0) {
+    const uint32_t setpoints = slave.sent[5].setpoints;
+    while (slave.twin[5].state == FRAME_DRIVE_HOMING || frame_drive_count(&slave.twin[5]) != 0) {
         TEST_ASSERT_EQUAL(HV_OK, cycle());
         TEST_ASSERT_EQUAL(DRIVE_HOMING, feedback[5].state);
     }
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].setpoints <= setpoints + 1);
+        TEST_ASSERT_TRUE(slave.sent[k].setpoints <= setpoints + 1);
     }
     await(DRIVE_ENABLED, 50);
     for (unsigned k = 0; k < AXES; k++) {
@@ -864,14 +862,16 @@ static void test_homing_ends_when_the_drive_says_so_and_the_new_position_is_know
 /* A drive that still reports the last homing as done at first. */
 static void test_homing_done_of_the_last_time_is_not_believed(void)
 {
-    slave.homing_takes_us = 400000;
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.sent[k].homing_takes_us = 400000;
+    }
     slave.homing_stale_us = 100000;
     enable();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
     for (int i = 0; i < 400; i++) {
         TEST_ASSERT_EQUAL(HV_OK, cycle());
         TEST_ASSERT_TRUE(are_all(DRIVE_HOMING));
-        TEST_ASSERT_EQUAL_UINT32(slave.drive[0].setpoints, slave.drive[1].setpoints);
+        TEST_ASSERT_EQUAL_UINT32(slave.sent[0].setpoints, slave.sent[1].setpoints);
     }
     follow_actual();
     await(DRIVE_ENABLED, 1000);
@@ -880,8 +880,9 @@ static void test_homing_done_of_the_last_time_is_not_believed(void)
 /* A drive that is at its zero already never says "not done": believed after half a second. */
 static void test_homing_done_from_the_start_is_believed_after_a_while(void)
 {
-    slave.homing_takes_us = 0;
-    slave.homing_stale_us = 1;
+    for (unsigned k = 0; k < AXES; k++) {
+        canraw_drives_place(&slave, k, 0);
+    }
     enable();
     const uint64_t begin_us = now_us;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
@@ -921,7 +922,7 @@ static void test_homing_that_never_ends_can_be_stopped(void)
 {
     open_rich();
     enable();
-    slave.drive[0].is_failing = true;
+    slave.sent[0].homing_takes_us = UINT32_MAX;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
     for (int i = 0; i < 500; i++) {
         (void)!cycle();
@@ -932,7 +933,7 @@ static void test_homing_that_never_ends_can_be_stopped(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(3);
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
-    TEST_ASSERT_FALSE(slave.drive[0].is_homing);
+    TEST_ASSERT_TRUE(slave.twin[0].state != FRAME_DRIVE_HOMING);
 }
 
 /* A map without a homing frame: the zero is where the drive has it, "homing" just passes. */
@@ -955,13 +956,13 @@ static void test_rich_setpoints_stand_on_actual_before_enabling(void)
     open_rich();
     await(DRIVE_DISABLED, 100);
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].setpoints = 1;
-        slave.drive[k].target = 0; /* left over from before */
+        slave.sent[k].has_target = true;
+        slave.sent[k].target = 0; /* left over from before */
     }
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].is_enabled);
-        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 1);
+        TEST_ASSERT_TRUE(frame_drive_is_enabled(&slave.twin[k]));
+        TEST_ASSERT_TRUE(slave.sent[k].largest_step <= 1);
     }
 }
 
@@ -971,10 +972,10 @@ static void test_rich_quick_stop_reaches_the_drives_without_another_send(void)
     enable();
     cycles(4);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
-    canraw_slave_step(&slave, now_us + CYCLE_US);
+    canraw_drives_step(&slave, now_us + CYCLE_US);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
-        TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+        TEST_ASSERT_EQUAL_UINT32(1, slave.sent[k].stops);
+        TEST_ASSERT_FALSE(frame_drive_is_enabled(&slave.twin[k]));
     }
 }
 
@@ -982,7 +983,7 @@ static void test_rich_drive_that_drops_out_is_seen(void)
 {
     open_rich();
     enable();
-    slave.drive[6].is_enabled = false;
+    frame_drive_drop(&slave.twin[6]);
     cycles(6);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[6].state);
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[5].state);
@@ -993,15 +994,15 @@ static void test_rich_homing_does_not_end_without_torque(void)
     open_rich();
     enable();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
-    slave.drive[6].is_enabled = false;
+    frame_drive_drop(&slave.twin[6]);
     for (int i = 0; i < 100; i++) {
         (void)!cycle();
         follow_actual();
     }
-    TEST_ASSERT_TRUE(slave.drive[6].is_homed);
+    TEST_ASSERT_TRUE(slave.twin[6].is_homed);
     TEST_ASSERT_EQUAL(DRIVE_HOMING, feedback[6].state);
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[5].state);
-    slave.drive[6].is_enabled = true;
+    canraw_drives_command(&slave, 6, CANRAW_ENABLE);
     await(DRIVE_ENABLED, 6);
 }
 
@@ -1009,16 +1010,16 @@ static void test_rich_fault_that_stays_outlives_its_reset(void)
 {
     open_rich();
     enable();
-    slave.drive[0].is_faulty = true;
+    frame_drive_fault(&slave.twin[0], 1);
     cycles(6);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
     TEST_ASSERT_EQUAL_HEX32(0x07, feedback[0].fault_code);
-    slave.drive[0].is_dumb = true; /* says nothing about its reset */
+    slave.twin[0].is_mute = true; /* says nothing about its reset */
     map.offline_periods = 5000;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(1500);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
-    slave.drive[0].is_dumb = false;
+    slave.twin[0].is_mute = false;
     cycles(10);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state); /* too late: ask again */
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
@@ -1033,11 +1034,11 @@ static void test_rich_status_that_the_map_does_not_judge_means_nothing(void)
     map.enabled_when.mask = map.fault_when.mask = 0;
     memset(&map.command[CANRAW_HOME], 0, sizeof map.command[0]);
     open_with(NULL, 0, true);
-    slave.drive[6].is_homed = false;
+    slave.twin[6].is_homed = false;
     enable();
     TEST_ASSERT_TRUE(feedback[6].is_homed);
-    slave.drive[5].is_enabled = false;
-    slave.drive[6].is_faulty = true;
+    frame_drive_drop(&slave.twin[5]);
+    frame_drive_fault(&slave.twin[6], 1);
     cycles(20);
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
     setpoint_q32[6] += MM(2); /* found here: a reset ends it with the quick stop, as the drive says nothing */
@@ -1056,7 +1057,7 @@ static void test_rich_fault_whose_status_is_nothing_has_a_code(void)
     map = canraw_maps_rich();
     map.fault_when = (canraw_when_t){0x00, 0xFF};
     open_with(NULL, 0, true);
-    slave.drive[2].is_homed = false;
+    slave.twin[2].is_homed = false;
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(1, feedback[2].fault_code);
@@ -1069,10 +1070,9 @@ static void test_rich_reset_that_has_not_gone_out_ends_no_fault(void)
     full.send = take_nothing;
     open_rich();
     enable();
-    slave.drive[0].is_faulty = true;
+    frame_drive_fault(&slave.twin[0], 1);
     cycles(6);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
-    slave.drive[0].is_faulty = false;
     driver.can.ops = &full;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     say(0x18FF0200, true, 6, (const uint8_t[6]){0x30, 0x04, 0, 0x3D, 0x09, 0});
@@ -1088,15 +1088,15 @@ static void test_rich_quick_stop_with_a_drive_that_is_gone(void)
 {
     open_rich();
     enable();
-    slave.drive[4].is_dumb = true;
+    slave.twin[4].is_mute = true;
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(4);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].stops >= 1);
+        TEST_ASSERT_TRUE(slave.sent[k].stops >= 1);
     }
-    slave.drive[4].is_dumb = false;
+    slave.twin[4].is_mute = false;
     cycles(10);
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
 }
@@ -1105,7 +1105,7 @@ static unsigned with_torque(void)
 {
     unsigned count = 0;
     for (unsigned k = 0; k < AXES; k++) {
-        count += slave.drive[k].is_enabled;
+        count += frame_drive_is_enabled(&slave.twin[k]);
     }
     return count;
 }
@@ -1116,7 +1116,6 @@ static void enable_gliding(uint32_t for_us)
     open_rich();
     slave.is_holding_on_stop = true;
     slave.glide_takes_us = for_us;
-    slave.glide_counts = 60;
     enable();
     cycles(50);
     TEST_ASSERT_EQUAL_UINT(AXES, with_torque());
@@ -1128,11 +1127,11 @@ static void test_stop_goes_on_for_a_drive_that_falls_silent(void)
     static const int k_before[] = {-30, 0, 20, 150, 245};
     for (unsigned i = 0; i < sizeof k_before / sizeof k_before[0]; i++) {
         enable_gliding(0);
-        slave.drive[4].is_dumb = k_before[i] < 0;
+        slave.twin[4].is_mute = k_before[i] < 0;
         cycles(k_before[i] < 0 ? -k_before[i] : 0);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
         cycles(k_before[i] > 0 ? k_before[i] : 0);
-        slave.drive[4].is_dumb = true;
+        slave.twin[4].is_mute = true;
         cycles(5200);
         TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
         TEST_ASSERT_TRUE(feedback[4].is_energized); /* nobody has heard otherwise */
@@ -1145,7 +1144,7 @@ static void test_stop_of_drives_that_all_fall_silent(void)
 {
     enable_gliding(0);
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_dumb = true;
+        slave.twin[k].is_mute = true;
     }
     for (int i = 0; i < 5300; i++) {
         (void)!cycle();
@@ -1194,7 +1193,7 @@ static void test_stop_that_waits_is_replaced_by_nothing(void)
         driver.can.ops = sim_can_hal(&node).ops;
         cycles(4);
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
+            TEST_ASSERT_EQUAL_UINT32(1, slave.sent[k].stops);
         }
     }
 }
@@ -1210,7 +1209,9 @@ static void test_reset_that_has_waited_for_long_is_given_up(void)
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
         cycles(100);
-        slave.drive[5].is_faulty = is_new_fault == 1;
+        if (is_new_fault == 1) {
+            frame_drive_fault(&slave.twin[5], 1);
+        }
         cycles(5500);
         TEST_ASSERT_EQUAL_UINT(0, with_torque());
         TEST_ASSERT_EQUAL(is_new_fault == 1 ? DRIVE_DISABLED : DRIVE_FAULT, feedback[6].state);
@@ -1222,7 +1223,7 @@ static void test_rich_enable_again_is_for_those_that_are_not(void)
 {
     open_rich();
     enable();
-    slave.drive[6].is_enabled = false;
+    frame_drive_drop(&slave.twin[6]);
     cycles(6);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[6].state);
     follow_actual();
@@ -1242,7 +1243,7 @@ static void test_positions_that_come_unasked(void)
     map.position_reply.data[1] = 0x15;
     map.homing_reply.data[1] = 0x12;
     open_with(NULL, 0, false);
-    slave.drive[3].is_homed = false;
+    slave.twin[3].is_homed = false;
     for (int i = 0; i < 100; i++) {
         for (unsigned k = 0; k < AXES; k++) {
             say(0x581 + k, false, 6, (const uint8_t[6]){0x00, 0x15, 0x40, 0x9C});
@@ -1264,8 +1265,8 @@ static void test_positions_that_come_unasked(void)
 static void test_ambiguous_late_answers_are_not_taken_for_another(void)
 {
     const uint8_t one_count[8] = {0x00, 0x15, 0x01, 0x00, 0x00, 0x00}; /* a position whose first byte reads as homed */
-    slave.drive[0].is_homed = false;
-    slave.drive[0].is_dumb = true;
+    slave.twin[0].is_homed = false;
+    slave.twin[0].is_mute = true;
     for (int i = 0; i < 400; i++) {
         (void)!cycle();
         if (i % 3 == 0) { /* late by more than a period, any phase */
@@ -1444,7 +1445,7 @@ static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
         for (int n = 0; n < 400; n++) {
             (void)!cycle();
             for (unsigned k = 0; k < AXES; k++) {
-                TEST_ASSERT_TRUE(feedback[k].is_energized || !slave.drive[k].is_enabled);
+                TEST_ASSERT_TRUE(feedback[k].is_energized || !frame_drive_is_enabled(&slave.twin[k]));
             }
         }
         TEST_ASSERT_EQUAL_UINT(0, energized());
@@ -1459,21 +1460,21 @@ static void test_off_is_told_again_to_a_drive_that_was_lost(void)
         map.enabled_when.mask = map.enabled_when.value = can_tell;
         open_with(NULL, 0, true);
         enable();
-        slave.drive[3].is_on = false;
+        slave.twin[3].is_cut = true;
         cycles(30);
         TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[3].state);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
         cycles(400);
         TEST_ASSERT_EQUAL_UINT(1, energized());
-        TEST_ASSERT_TRUE(feedback[3].is_energized && slave.drive[3].is_enabled);
-        slave.drive[3].is_on = true;
+        TEST_ASSERT_TRUE(feedback[3].is_energized && frame_drive_is_enabled(&slave.twin[3]));
+        slave.twin[3].is_cut = false;
         cycles(400);
         TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[3].state);
         TEST_ASSERT_EQUAL_UINT(0, energized());
-        TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
-        slave.drive[3].is_on = false;
+        TEST_ASSERT_FALSE(frame_drive_is_enabled(&slave.twin[3]));
+        slave.twin[3].is_cut = true;
         cycles(30);
-        slave.drive[3].is_on = true;
+        slave.twin[3].is_cut = false;
         slave.logged = 0;
         cycles(30);
         for (unsigned i = 0; i < slave.logged; i++) {
@@ -1490,14 +1491,14 @@ static void test_off_is_told_to_a_drive_that_comes_back_with_a_fault(void)
         map.enabled_when.mask = map.enabled_when.value = can_tell;
         open_with(NULL, 0, true);
         enable();
-        slave.drive[3].is_on = false;
+        slave.twin[3].is_cut = true;
         cycles(30);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
-        slave.drive[3].is_faulty = true;
-        slave.drive[3].is_on = true;
+        frame_drive_fault(&slave.twin[3], 1);
+        slave.twin[3].is_cut = false;
         cycles(400);
         TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[3].state);
-        TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
+        TEST_ASSERT_FALSE(frame_drive_is_enabled(&slave.twin[3]));
         TEST_ASSERT_EQUAL_UINT(0, energized());
     }
 }
@@ -1511,14 +1512,14 @@ static void test_stop_that_waits_goes_out_to_a_drive_in_fault(void)
     enable();
     driver.can.ops = &full;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
-    slave.drive[3].is_faulty = true;
+    frame_drive_fault(&slave.twin[3], 1);
     say(0x18FF0203, true, 6, (const uint8_t[6]){0x30, 0x07, 0, 0x3D, 0x09, 0});
     (void)!poll_once();
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[3].state);
-    TEST_ASSERT_EQUAL_UINT32(0, slave.drive[3].stops);
+    TEST_ASSERT_EQUAL_UINT32(0, slave.sent[3].stops);
     driver.can.ops = sim_can_hal(&node).ops;
     cycles(10);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[3].stops);
+    TEST_ASSERT_EQUAL_UINT32(1, slave.sent[3].stops);
 }
 
 static uint32_t waiting_frames;
@@ -1563,10 +1564,10 @@ static void test_off_of_a_drive_in_fault_is_told_when_it_says_so(void)
 {
     open_rich();
     enable();
-    slave.drive[1].is_faulty = true;
+    frame_drive_fault(&slave.twin[1], 1);
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
-    TEST_ASSERT_TRUE(feedback[1].is_energized && slave.drive[1].is_enabled);
+    TEST_ASSERT_TRUE(feedback[1].is_energized && frame_drive_is_enabled(&slave.twin[1]));
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(320);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);

@@ -6,11 +6,11 @@
 
 #include <string.h>
 
+#include "canraw_drives.h"
 #include "canraw_maps.h"
-#include "canraw_slave.h"
 #include "unity.h"
 
-#define AXES      CANRAW_SLAVES
+#define AXES      DRIVES_MAX
 #define CYCLE_US  1000u
 #define LISTEN_MS 100u
 
@@ -18,7 +18,7 @@ static sim_can_bus_t bus;
 static sim_can_t node;
 static sim_can_t other; /* the other master's */
 static sim_can_t spy;   /* hears all */
-static canraw_slave_t slave;
+static canraw_drives_t slave;
 static canraw_map_t map;
 static canraw_t driver;
 static drives_t hal;
@@ -30,7 +30,7 @@ static void cycles(unsigned count)
 {
     while (count-- > 0) {
         now_us += CYCLE_US;
-        canraw_slave_step(&slave, now_us);
+        canraw_drives_step(&slave, now_us);
         (void)!drives_poll(hal, now_us, feedback);
         for (unsigned k = 0; k < AXES; k++) {
             setpoint_q32[k] = feedback[k].state == DRIVE_ENABLED ? setpoint_q32[k] : feedback[k].actual_mm_q32;
@@ -65,9 +65,9 @@ static void start(canraw_master_t reaction)
     map.listen_ms = LISTEN_MS;
     now_us = 1000000;
     sim_can_bus_init(&bus, 0, NULL, 0);
-    canraw_slave_open(&slave, &bus, true);
+    canraw_drives_open(&slave, &bus, canraw_maps_rich());
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].position = CANRAW_SLAVE_RICH_ZERO - (20 + 10 * (int)k) * 10000 / 3;
+        canraw_drives_place(&slave, k, CANRAW_DRIVES_RICH_ZERO - (20 + 10 * (int)k) * 10000 / 3);
     }
     memset(feedback, 0, sizeof feedback);
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, filter, canraw_filters(&map, filter)));
@@ -158,7 +158,7 @@ static void test_in_motion_it_is_named_within_a_period_and_all_stop(void)
     cycles(6000);
     for (uint8_t k = 0; k < AXES; k++) {
         TEST_ASSERT_FALSE(feedback[k].is_energized);
-        TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+        TEST_ASSERT_FALSE(frame_drive_is_enabled(&slave.twin[k]));
     }
 }
 
@@ -173,15 +173,15 @@ static void test_one_that_goes_on_is_answered_each_time(void)
         say(map.axis[1].setpoint_id);
         cycles(5);
         TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
-        TEST_ASSERT_FALSE(slave.drive[1].is_enabled && n > 300);
+        TEST_ASSERT_FALSE(frame_drive_is_enabled(&slave.twin[1]) && n > 300);
         if (n == 500) {
-            slave.drive[1].is_enabled = true; /* it was told to */
+            canraw_drives_command(&slave, 1, CANRAW_ENABLE); /* it was told to */
         }
     }
     cycles(1000);
     for (uint8_t k = 0; k < AXES; k++) {
         TEST_ASSERT_FALSE(feedback[k].is_energized);
-        TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+        TEST_ASSERT_FALSE(frame_drive_is_enabled(&slave.twin[k]));
     }
 }
 
@@ -190,7 +190,7 @@ static void test_while_no_drive_is_known_it_listens_again(void)
 {
     start(CANRAW_MASTER_STOP);
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_dumb = true;
+        slave.twin[k].is_mute = true;
     }
     cycles(3 * LISTEN_MS);
     TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
@@ -202,7 +202,7 @@ static void test_while_no_drive_is_known_it_listens_again(void)
     cycles(990);
     TEST_ASSERT_EQUAL_UINT(0, frames_heard());
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_dumb = false;
+        slave.twin[k].is_mute = false;
     }
     await(DRIVE_DISABLED);
 }

@@ -7,7 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "canraw_slave.h"
+#include "canraw_drives.h"
+#include "canraw_maps.h"
 #include "platform/bus.h"
 #include "platform/canraw_section.h"
 #include "config/config.h"
@@ -134,7 +135,7 @@ static void test_preset_frames_byte_for_byte(void)
 /* Drives that know the bytes alone are enabled, homed and led along by the preset. */
 static void test_preset_drives_are_enabled_homed_and_led(void)
 {
-    static canraw_slave_t slave;
+    static canraw_drives_t slave;
     sim_can_bus_t bus;
     sim_can_t node;
     canraw_map_t map;
@@ -147,16 +148,16 @@ static void test_preset_drives_are_enabled_homed_and_led(void)
     TEST_ASSERT_EQUAL_UINT32(100, map.listen_ms);
     map.listen_ms = 0; /* the times below are counted from the first frame */
     sim_can_bus_init(&bus, 100, NULL, 0);
-    canraw_slave_open(&slave, &bus, false);
+    canraw_drives_open(&slave, &bus, canraw_maps_plain());
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0));
     TEST_ASSERT_EQUAL(HV_OK, canraw_init(&driver, &map, sim_can_hal(&node)));
     const drives_t hal = canraw_hal(&driver);
     for (unsigned k = 0; k < 6; k++) {
-        slave.drive[k].is_homed = false;
-        slave.drive[k].position = 100000;
+        slave.twin[k].is_homed = false;
+        canraw_drives_place(&slave, k, 100000);
     }
     for (int i = 1; i < 4000; i++) {
-        canraw_slave_step(&slave, i * 1000);
+        canraw_drives_step(&slave, i * 1000);
         (void)!drives_poll(hal, i * 1000, feedback);
         if (i == 100) {
             TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[0].state);
@@ -175,9 +176,9 @@ static void test_preset_drives_are_enabled_homed_and_led(void)
     for (unsigned k = 0; k < 6; k++) {
         TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[k].state);
         TEST_ASSERT_TRUE(feedback[k].is_homed);
-        TEST_ASSERT_INT32_WITHIN(800, 3000 * 100, slave.drive[k].position); /* 150 mm, less what is on the way */
-        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 401); /* 0.05 mm per cycle, four cycles, 2000 pulses per mm */
-        TEST_ASSERT_EQUAL_UINT16(2000, slave.drive[k].speed);
+        TEST_ASSERT_INT32_WITHIN(800, 3000 * 100, frame_drive_count(&slave.twin[k])); /* 150 mm, less what is on the way */
+        TEST_ASSERT_TRUE(slave.sent[k].largest_step <= 401); /* 0.05 mm per cycle, four cycles, 2000 pulses per mm */
+        TEST_ASSERT_EQUAL_UINT16(2000, slave.sent[k].speed);
     }
 }
 

@@ -200,6 +200,26 @@ static void test_a_fault_stays_until_its_cause_is_gone(void)
     TEST_ASSERT_EQUAL_HEX8(4, status());
 }
 
+static void test_a_stop_ends_homing_without_a_zero(void)
+{
+    command(0x20);
+    command(0x24);
+    wait_ms(10);
+    command(0x22);
+    wait_ms(1000);
+    TEST_ASSERT_EQUAL_HEX8(0x01, status());
+}
+
+static void test_torque_that_outlives_a_fault_is_taken_by_a_command(void)
+{
+    m_drive.is_torque_kept = true;
+    command(0x20);
+    frame_drive_fault(&m_drive, 5);
+    TEST_ASSERT_EQUAL_HEX8(0x03, status());
+    command(0x21);
+    TEST_ASSERT_EQUAL_HEX8(0x02, status());
+}
+
 static void test_homing_that_fails_is_a_fault_that_says_so(void)
 {
     m_drive.is_homing_broken = true;
@@ -351,6 +371,8 @@ int main(void)
     RUN_TEST(test_an_absolute_encoder_knows_its_zero_without_homing);
     RUN_TEST(test_set_points_move_it_only_with_torque);
     RUN_TEST(test_a_fault_stays_until_its_cause_is_gone);
+    RUN_TEST(test_a_stop_ends_homing_without_a_zero);
+    RUN_TEST(test_torque_that_outlives_a_fault_is_taken_by_a_command);
     RUN_TEST(test_homing_that_fails_is_a_fault_that_says_so);
     RUN_TEST(test_what_is_made_to_fail);
     RUN_TEST(test_without_a_query_it_tells_by_itself);
