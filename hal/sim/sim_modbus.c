@@ -35,6 +35,10 @@ static void access_value(sim_modbus_device_t *device, modbus_function_t function
 /* The device's part: acts and fills the answer. */
 static void serve(sim_modbus_device_t *device, const modbus_request_t *request, modbus_result_t *result)
 {
+    if (device->answer != NULL) {
+        device->answer(device->ctx, device, request, result);
+        return;
+    }
     if (request->address + (uint32_t)request->count > SIM_MODBUS_VALUES) {
         result->status = HV_ERR_STATE;
         result->exception = 2;

@@ -11,7 +11,10 @@
 #define SIM_MODBUS_VALUES 128u
 
 /** A device; a test reads and writes it as it likes. */
-typedef struct {
+typedef struct sim_modbus_device {
+    /** Answers in the place of the values below; NULL: they do. A result that it leaves as it is is a timeout. */
+    void (*answer)(void *ctx, const struct sim_modbus_device *device, const modbus_request_t *request, modbus_result_t *result);
+    void *ctx;
     uint8_t unit; /**< [1, 247] or 255 */
     uint16_t holding[SIM_MODBUS_VALUES];
     uint16_t input[SIM_MODBUS_VALUES];

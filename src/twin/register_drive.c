@@ -129,7 +129,7 @@ static uint32_t status_of(const register_drive_t *self)
 {
     unsigned wanted = self->is_homed ? STATUS_DONE : 0;
     wanted |= self->has_homing_failed ? STATUS_FAILED : 0;
-    wanted |= self->state == REGISTER_TORQUE || self->state == REGISTER_HOMING ? STATUS_ENABLED : 0;
+    wanted |= self->motor->has_torque ? STATUS_ENABLED : 0;
     wanted |= self->state == REGISTER_FAULT ? STATUS_FAULT : 0;
     const status_conditions_t conditions = conditions_of(self->map);
     return status_word(&conditions, wanted);
@@ -178,6 +178,7 @@ static void stop(register_drive_t *self)
 {
     (void)motor_stop(self->motor, self->usual_speed / STOP_S);
     self->has_target = false;
+    self->state = self->state == REGISTER_HOMING ? REGISTER_TORQUE : self->state;
 }
 
 static void torque_off(register_drive_t *self, register_state_t state)
@@ -190,7 +191,10 @@ static void torque_off(register_drive_t *self, register_state_t state)
 void register_drive_fault(register_drive_t *self, uint32_t alarm)
 {
     self->alarm = alarm;
-    torque_off(self, REGISTER_FAULT);
+    self->state = REGISTER_FAULT;
+    if (!self->is_torque_kept) {
+        torque_off(self, REGISTER_FAULT);
+    }
 }
 
 void register_drive_drop(register_drive_t *self)
@@ -204,6 +208,7 @@ void register_drive_power(register_drive_t *self, bool is_on, uint64_t now_us)
     self->is_powered = is_on;
     self->boot_us = self->heard_us = now_us + BOOT_US;
     self->alarm = 0;
+    self->speed = self->usual_speed;
     self->has_homing_failed = false;
     self->is_homed = !is_incremental;
     self->origin = is_incremental ? self->motor->actual : self->origin;
@@ -234,14 +239,12 @@ static void command(register_drive_t *self, modbus_drive_command_t which)
         stop(self);
         return;
     case MODBUS_DRIVE_DISABLE:
-        if (self->state != REGISTER_FAULT) {
-            torque_off(self, REGISTER_OFF);
-        }
+        torque_off(self, self->state == REGISTER_FAULT ? REGISTER_FAULT : REGISTER_OFF);
         return;
     case MODBUS_DRIVE_RESET:
         if (self->state == REGISTER_FAULT && !self->is_broken) {
             self->alarm = 0;
-            self->state = REGISTER_OFF;
+            torque_off(self, REGISTER_OFF);
         }
         return;
     case MODBUS_DRIVE_ENABLE:

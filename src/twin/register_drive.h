@@ -29,6 +29,7 @@ typedef struct {
     bool is_deaf;          /**< answers, but acts on nothing */
     bool is_broken;        /**< the cause of its fault stays */
     bool is_homing_broken; /**< homing ends with an error */
+    bool is_torque_kept;   /**< a fault leaves it its torque until that is taken from it */
     uint32_t late_us;
     uint32_t lost, damaged, halved, refused;
     uint8_t exception; /**< of those that are refused */

@@ -11,8 +11,8 @@
 #include "canraw_maps.h"
 #include "canopen_twin.h"
 #include "heave/cia402.h"
+#include "modbus_drives.h"
 #include "modbus_maps.h"
-#include "modbus_slave.h"
 #include "sim_drives.h"
 
 /** A backend under test: seven axes with 300 mm of travel each, standing at 100 mm + 10 mm per axis, homed, disabled. */
@@ -292,13 +292,13 @@ static void glide_cia402(uint32_t for_us)
 
 /* Drives behind Modbus lines: one each (TCP), or one for all (RTU). */
 
-static modbus_slave_t modbus_slave;
+static modbus_drives_t modbus_drives;
 static modbus_drive_map_t modbus_map;
 static modbus_drive_t modbus_drive;
 
 static void settle_modbus(uint64_t until_us)
 {
-    modbus_slave_step(&modbus_slave, until_us);
+    modbus_drives_step(&modbus_drives, until_us);
 }
 
 static void cycles_modbus(drives_t drives, int count)
@@ -315,13 +315,13 @@ static void cycles_modbus(drives_t drives, int count)
 static void start_modbus(drives_t *drives, bool is_small, bool is_shared)
 {
     hal_modbus_t line[DRIVES_MAX];
-    modbus_slave_open(&modbus_slave, is_small, is_shared, is_shared ? 150 : 300, 20000, NULL, 0);
+    modbus_drives_open(&modbus_drives, is_small, is_shared, is_shared ? 150 : 300, 20000);
     modbus_map = is_small ? modbus_maps_small(is_shared) : modbus_maps_wide(is_shared);
     for (unsigned k = 0; k < AXES; k++) {
         const int32_t mm = 100 + 10 * (int32_t)k;
-        modbus_slave_place(&modbus_slave, k, is_small ? mm * 100 : MODBUS_SLAVE_WIDE_ZERO - (mm * 10000 + 1) / 3);
+        modbus_drives_place(&modbus_drives, k, is_small ? mm * 100 : MODBUS_DRIVES_WIDE_ZERO - (mm * 10000 + 1) / 3);
     }
-    modbus_slave_lines(&modbus_slave, line);
+    modbus_drives_lines(&modbus_drives, line);
     TEST_ASSERT_EQUAL(HV_OK, modbus_drive_init(&modbus_drive, &modbus_map, line));
     *drives = modbus_drive_hal(&modbus_drive);
     cycles_modbus(*drives, 100);
@@ -347,25 +347,24 @@ static bool open_modbus_small(drives_t *drives)
 
 static void fault_modbus(uint8_t axis)
 {
-    modbus_slave.drive[axis].is_faulty = true;
+    register_drive_fault(&modbus_drives.twin[axis], MODBUS_DRIVES_ALARM);
     cycles_modbus(hal, 20); /* the next feedback tells */
 }
 
 static void power_modbus(uint8_t axis, bool is_on)
 {
-    modbus_slave.drive[axis].is_on = is_on;
+    modbus_drives_power(&modbus_drives, axis, is_on);
 }
 
 static bool has_torque_modbus(uint8_t axis)
 {
-    return modbus_slave.drive[axis].is_enabled;
+    return modbus_drives.motor[axis].has_torque;
 }
 
 static void glide_modbus(uint32_t for_us)
 {
-    modbus_slave.is_holding_on_stop = true;
-    modbus_slave.glide_takes_us = for_us;
-    modbus_slave.glide_counts = modbus_slave.is_small ? 2 : 60;
+    modbus_drives.is_holding_on_stop = true;
+    modbus_drives.glide_takes_us = for_us;
 }
 
 static const fixture_t k_fixtures[] = {

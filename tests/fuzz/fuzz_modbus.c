@@ -11,8 +11,8 @@
 #include <string.h>
 
 #include "drive_run.h"
+#include "modbus_drives.h"
 #include "modbus_maps.h"
-#include "modbus_slave.h"
 #include "modbus_tap.h"
 
 #define CYCLE_US        1000u
@@ -65,7 +65,7 @@ typedef struct {
 /* Lines, drives, and the driver. */
 typedef struct {
     drive_run_t run;
-    modbus_slave_t slave;
+    modbus_drives_t slave;
     modbus_tap_t tap;
     modbus_drive_t driver;
     const layout_t *layout;
@@ -79,11 +79,11 @@ static modbus_drive_map_t m_map[LAYOUTS];
 static world_t m_start[2][LAYOUTS][2]; /* off, and enabled */
 static world_t m_world[2];             /* the one that gets everything, and the one without replies that nobody waits for */
 
-/* --- Numbers, by the register list of modbus_slave.h --- */
+/* --- Numbers, by the register list of modbus_drives.h --- */
 
 static int64_t counts_of(const world_t *self, q32_t mm_q32)
 {
-    return self->layout->is_small ? drive_run_counts(mm_q32, 300, 0) : drive_run_counts(mm_q32, -10000, MODBUS_SLAVE_WIDE_ZERO);
+    return self->layout->is_small ? drive_run_counts(mm_q32, 300, 0) : drive_run_counts(mm_q32, -10000, MODBUS_DRIVES_WIDE_ZERO);
 }
 
 static int64_t counts_per_mm(const world_t *self)
@@ -374,7 +374,7 @@ static void poll(world_t *self)
         self->seen[k].was_faulty = self->driver.axis[k].phase == MODBUS_DRIVE_FAULT;
         self->seen[k].is_reset &= self->seen[k].was_faulty;
     }
-    modbus_slave_step(&self->slave, run->now_us);
+    modbus_drives_step(&self->slave, run->now_us);
     const hv_status_t status = drives_poll(run->drives, run->now_us, run->feedback);
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         check_drive(self, k, before[k].state);
@@ -447,17 +447,13 @@ static void bring_up(unsigned i, unsigned layout)
     self->layout = &k_layout[layout];
     self->cycle_us = CYCLE_US;
     self->run.now_us = 5000000;
-    modbus_slave_open(&self->slave, self->layout->is_small, self->layout->is_shared, self->layout->transaction_us, 20000, NULL,
-                      0);
+    modbus_drives_open(&self->slave, self->layout->is_small, self->layout->is_shared, self->layout->transaction_us, 20000);
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         const int32_t mm = 20 + 10 * (int32_t)k;
-        modbus_slave_place(&self->slave, k, self->layout->is_small ? mm * 100 : MODBUS_SLAVE_WIDE_ZERO - mm * 10000 / 3);
-        if (!self->layout->is_small) { /* it stays where it is when it gets torque */
-            memcpy(&self->slave.device[k].holding[10], &self->slave.device[k].holding[2], 2 * sizeof(uint16_t));
-        }
+        modbus_drives_place(&self->slave, k, self->layout->is_small ? mm * 100 : MODBUS_DRIVES_WIDE_ZERO - mm * 10000 / 3);
         self->seen[k].was_waiting = true;
     }
-    modbus_slave_lines(&self->slave, inner);
+    modbus_drives_lines(&self->slave, inner);
     self->tap = (modbus_tap_t){.watcher = self, .asked = see_asked, .answered = see_answered};
     modbus_tap_open(&self->tap, inner, outer);
     FUZZ_REQUIRE(modbus_drive_init(&self->driver, &m_map[layout], outer) == HV_OK);
@@ -520,23 +516,28 @@ static void slip_in(world_t *self, const record_t *record)
 
 static void disturb(world_t *self, const record_t *record)
 {
-    modbus_slave_drive_t *drive = &self->slave.drive[record->drive];
+    const unsigned k = record->drive;
+    register_drive_t *drive = &self->slave.twin[k];
     const bool is_so = record->data[0] % 2 != 0;
     switch (record->kind % 6) {
     case 0:
-        drive->is_faulty = is_so;
+        if (is_so) {
+            register_drive_fault(drive, MODBUS_DRIVES_ALARM);
+        } else {
+            modbus_drives_command(&self->slave, k, MODBUS_DRIVE_RESET);
+        }
         break;
     case 1:
-        drive->is_on = is_so;
+        modbus_drives_power(&self->slave, k, is_so);
         break;
     case 2:
-        drive->is_enabled = is_so;
+        modbus_drives_command(&self->slave, k, is_so ? MODBUS_DRIVE_ENABLE : MODBUS_DRIVE_DISABLE);
         break;
     case 3:
-        drive->is_weak = is_so;
+        self->slave.asked[k].is_weak = is_so;
         break;
     case 4:
-        drive->is_frozen = is_so;
+        self->slave.motor[k].is_jammed = is_so;
         break;
     default:
         drive->is_homed = is_so;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * modbus_maps.h - maps of the two dialects of modbus_slave.h, as data.
+ * modbus_maps.h - maps of the two dialects of modbus_drives.h, as data.
  */
 #ifndef MODBUS_MAPS_H
 #define MODBUS_MAPS_H

@@ -6,16 +6,16 @@
 
 #include <string.h>
 
+#include "modbus_drives.h"
 #include "modbus_maps.h"
-#include "modbus_slave.h"
 #include "unity.h"
 
-#define AXES     MODBUS_SLAVES
+#define AXES     DRIVES_MAX
 #define CYCLE_US 1000u
 #define MM(x)    ((q32_t)(x)*Q32_ONE)
 #define START_MM 150
 
-static modbus_slave_t slave;
+static modbus_drives_t slave;
 static modbus_drive_map_t map;
 static modbus_drive_t driver;
 static drives_t hal;
@@ -25,13 +25,13 @@ static q32_t setpoint_q32[DRIVES_MAX];
 
 static int32_t wide_counts(int32_t mm)
 {
-    return MODBUS_SLAVE_WIDE_ZERO - (mm * 10000 + 1) / 3;
+    return MODBUS_DRIVES_WIDE_ZERO - (mm * 10000 + 1) / 3;
 }
 
 static hv_status_t cycle(void)
 {
     now_us += CYCLE_US;
-    modbus_slave_step(&slave, now_us);
+    modbus_drives_step(&slave, now_us);
     (void)!drives_poll(hal, now_us, feedback);
     return drives_send(hal, now_us, setpoint_q32);
 }
@@ -75,13 +75,21 @@ static void open_slaves(bool is_small, bool is_shared, uint32_t transaction_us)
     now_us = 1000000;
     memset(feedback, 0, sizeof feedback);
     memset(setpoint_q32, 0, sizeof setpoint_q32);
-    modbus_slave_open(&slave, is_small, is_shared, transaction_us, 20000, NULL, 0);
+    modbus_drives_open(&slave, is_small, is_shared, transaction_us, 20000);
     for (unsigned k = 0; k < AXES; k++) {
-        modbus_slave_place(&slave, k, is_small ? START_MM * 100 : wide_counts(START_MM));
+        modbus_drives_place(&slave, k, is_small ? START_MM * 100 : wide_counts(START_MM));
     }
-    modbus_slave_lines(&slave, line);
+    modbus_drives_lines(&slave, line);
     TEST_ASSERT_EQUAL(HV_OK, modbus_drive_init(&driver, &map, line));
     hal = modbus_drive_hal(&driver);
+}
+
+/* What its registers hold from before. */
+static void set_old_target(unsigned k, int32_t counts)
+{
+    slave.asked[k].target = counts;
+    register_drive_find(&slave.twin[k], 10)->value = (uint16_t)((uint32_t)counts >> 16);
+    register_drive_find(&slave.twin[k], 11)->value = (uint16_t)counts;
 }
 
 /* A line each, quick. */
@@ -202,7 +210,7 @@ static void test_startup_writes_and_reads_back_before_a_drive_is_ready(void)
 {
     await(DRIVE_DISABLED, 100);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT16(50, slave.device[k].holding[20]);
+        TEST_ASSERT_EQUAL_UINT16(50, modbus_drives_register(&slave, k, 20));
     }
     TEST_ASSERT_EQUAL_STRING("ready", report_of(0).phase);
     TEST_ASSERT_EQUAL_UINT8(1, report_of(0).address);
@@ -210,9 +218,9 @@ static void test_startup_writes_and_reads_back_before_a_drive_is_ready(void)
 
 static void test_startup_takes_torque_off_a_drive_that_was_left_with_it(void)
 {
-    slave.drive[3].is_enabled = true;
+    modbus_drives_command(&slave, 3, MODBUS_DRIVE_ENABLE);
     await(DRIVE_DISABLED, 100);
-    TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
+    TEST_ASSERT_FALSE(slave.motor[3].has_torque);
 }
 
 static void test_startup_wrong_value_is_refused_by_name_and_taken_when_mended(void)
@@ -240,7 +248,11 @@ static void test_startup_missing_register_is_refused_with_the_exception(void)
 
 static void test_startup_item_that_is_not_checked_may_read_as_it_likes(void)
 {
-    map.item[1] = (modbus_drive_item_t){21, 0x0999, true, false}; /* the slave puts its own value back */
+    map.item[1] = (modbus_drive_item_t){21, 0x0999, true, false};
+    slave.map.item[0].is_written = true;
+    for (unsigned k = 0; k < AXES; k++) {
+        register_drive_find(&slave.twin[k], 21)->is_held = true; /* it goes on with its own value */
+    }
     await(DRIVE_DISABLED, 100);
 }
 
@@ -258,9 +270,9 @@ static void test_startup_refused_drive_begins_again_at_once_by_a_reset_and_by_no
 {
     await(DRIVE_DISABLED, 100);
     map.item[1].address = 5000;
-    slave.drive[2].is_on = false;
+    modbus_drives_power(&slave, 2, false);
     cycles(500);
-    slave.drive[2].is_on = true;
+    modbus_drives_power(&slave, 2, true);
     for (int i = 0; i < 1000 && strcmp(report_of(2).phase, "refused") != 0; i++) {
         (void)!cycle();
     }
@@ -277,11 +289,11 @@ static void test_startup_without_anything_to_switch_off_or_to_write(void)
 {
     map.command[MODBUS_DRIVE_DISABLE].count = 0;
     await(DRIVE_DISABLED, 100);
-    TEST_ASSERT_EQUAL_UINT16(50, slave.device[3].holding[20]);
+    TEST_ASSERT_EQUAL_UINT16(50, modbus_drives_register(&slave, 3, 20));
     setUp();
     map.items = 0;
     await(DRIVE_DISABLED, 100);
-    TEST_ASSERT_EQUAL_UINT16(0, slave.device[3].holding[20]);
+    TEST_ASSERT_EQUAL_UINT16(0, modbus_drives_register(&slave, 3, 20));
 }
 
 static void test_startup_exception_that_is_none_of_the_known(void)
@@ -341,7 +353,7 @@ static void test_answers_of_another_length_are_damaged(void)
 
 static void test_startup_drive_that_comes_late_is_found(void)
 {
-    slave.drive[6].is_on = false;
+    modbus_drives_power(&slave, 6, false);
     cycles(1000);
     TEST_ASSERT_EQUAL_STRING("waiting for the line", report_of(6).phase);
     TEST_ASSERT_EQUAL_STRING("no answer", report_of(6).trouble);
@@ -349,26 +361,26 @@ static void test_startup_drive_that_comes_late_is_found(void)
     TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT)); /* there is nothing to begin again yet */
     TEST_ASSERT_EQUAL_STRING("waiting for the line", report_of(6).phase);
-    slave.drive[6].is_on = true;
+    modbus_drives_power(&slave, 6, true);
     await(DRIVE_DISABLED, 1000);
 }
 
 static void test_startup_torque_off_that_was_refused_is_tried_again(void)
 {
     map.command[MODBUS_DRIVE_DISABLE].block[0].address = 5000;
-    slave.drive[3].is_enabled = true;
+    modbus_drives_command(&slave, 3, MODBUS_DRIVE_ENABLE);
     cycles(100);
     TEST_ASSERT_EQUAL_STRING("refused", report_of(3).phase);
     TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_EXCEPTION, feedback[3].fault_code);
     TEST_ASSERT_EQUAL_UINT8(0, driver.axis[3].write.failures);
     map.command[MODBUS_DRIVE_DISABLE].block[0].address = 0;
     await(DRIVE_DISABLED, 3000);
-    TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
+    TEST_ASSERT_FALSE(slave.motor[3].has_torque);
 }
 
 static void test_startup_drive_with_an_alarm_is_never_ready(void)
 {
-    slave.drive[4].is_faulty = true;
+    register_drive_fault(&slave.twin[4], MODBUS_DRIVES_ALARM);
     for (int i = 0; i < 100; i++) {
         (void)!cycle();
         TEST_ASSERT_TRUE(feedback[4].state == DRIVE_OFFLINE || feedback[4].state == DRIVE_FAULT);
@@ -383,20 +395,19 @@ static void test_startup_drive_with_an_alarm_is_never_ready(void)
 static void test_enable_with_an_old_target_in_the_register_makes_no_step(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        slave.device[k].holding[10] = 7;
-        slave.device[k].holding[11] = 7;
+        set_old_target(k, 0x70007);
     }
     enable();
     cycles(100);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
-        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.drive[k].position);
+        TEST_ASSERT_EQUAL_INT32(0, slave.asked[k].largest_step);
+        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), register_drive_count(&slave.twin[k]));
     }
 }
 
 static void test_enable_one_drive_without_torque_keeps_all_waiting(void)
 {
-    slave.drive[4].is_weak = true;
+    slave.asked[4].is_weak = true;
     await(DRIVE_DISABLED, 100);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(500);
@@ -406,7 +417,7 @@ static void test_enable_one_drive_without_torque_keeps_all_waiting(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     await(DRIVE_DISABLED, 100);
     cycles(20);
-    TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
+    TEST_ASSERT_FALSE(slave.motor[3].has_torque);
 }
 
 /* The register holds an old target, which must neither be touched before torque nor be the first that is written. */
@@ -415,45 +426,43 @@ static void test_enable_target_last_writes_it_after_torque_only(void)
     map.is_target_last = true;
     await(DRIVE_DISABLED, 100);
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_frozen = true;
-        slave.device[k].holding[10] = 7;
-        slave.device[k].holding[11] = 7;
+        slave.motor[k].is_jammed = true;
+        set_old_target(k, 0x70007);
     }
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     for (int i = 0; i < 300 && !are_all(DRIVE_ENABLED); i++) {
         bool had_torque[AXES];
         for (unsigned k = 0; k < AXES; k++) {
-            had_torque[k] = slave.drive[k].is_enabled;
+            had_torque[k] = slave.motor[k].has_torque;
         }
         (void)!cycle();
         follow_actual();
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_TRUE(had_torque[k] || slave.device[k].holding[11] == 7);
+            TEST_ASSERT_TRUE(had_torque[k] || modbus_drives_register(&slave, k, 11) == 7);
         }
     }
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.drive[k].target);
+        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.asked[k].target);
     }
 }
 
 static void test_enable_target_last_waits_for_torque(void)
 {
     map.is_target_last = true;
-    slave.drive[3].is_frozen = true; /* else it follows the old target */
-    slave.drive[4].is_weak = true;
+    slave.asked[4].is_weak = true;
     await(DRIVE_DISABLED, 100);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(500);
     TEST_ASSERT_EQUAL_STRING("waits for its torque", report_of(4).phase);
     TEST_ASSERT_EQUAL_STRING("waits for all drives", report_of(3).phase);
-    TEST_ASSERT_EQUAL_UINT16(0, slave.device[4].holding[11]);
+    TEST_ASSERT_EQUAL_UINT16(0, modbus_drives_register(&slave, 4, 11));
 }
 
 static void test_torque_lost_is_disabled(void)
 {
     enable();
-    slave.drive[2].is_enabled = false;
+    register_drive_drop(&slave.twin[2]);
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
 }
@@ -461,12 +470,12 @@ static void test_torque_lost_is_disabled(void)
 /* While it waits for the others. */
 static void test_torque_lost_before_all_have_it_is_disabled(void)
 {
-    slave.drive[4].is_weak = true;
+    slave.asked[4].is_weak = true;
     await(DRIVE_DISABLED, 100);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(200);
     TEST_ASSERT_EQUAL_STRING("waits for all drives", report_of(3).phase);
-    slave.drive[3].is_enabled = false;
+    register_drive_drop(&slave.twin[3]);
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[3].state);
     TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[2].state);
@@ -475,7 +484,7 @@ static void test_torque_lost_before_all_have_it_is_disabled(void)
 static void test_enable_again_is_for_those_that_are_not(void)
 {
     enable();
-    slave.drive[2].is_enabled = false;
+    register_drive_drop(&slave.twin[2]);
     cycles(20);
     follow_actual();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
@@ -483,7 +492,7 @@ static void test_enable_again_is_for_those_that_are_not(void)
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[1].state);
     TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[2].state);
     await(DRIVE_ENABLED, 200);
-    TEST_ASSERT_EQUAL_INT32(0, slave.drive[2].largest_step);
+    TEST_ASSERT_EQUAL_INT32(0, slave.asked[2].largest_step);
 }
 
 /* Nothing to switch it on with, and nothing that tells: torque is believed of a drive that answers. */
@@ -492,13 +501,13 @@ static void test_enable_where_the_map_knows_no_torque(void)
     map.command[MODBUS_DRIVE_ENABLE].count = 0;
     map.enabled_when.mask = 0;
     for (unsigned k = 0; k < AXES; k++) {
-        slave.device[k].holding[11] = 7;
+        set_old_target(k, 7);
     }
     await(DRIVE_DISABLED, 100);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     await(DRIVE_ENABLED, 100);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.drive[k].target);
+        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.asked[k].target);
     }
 }
 
@@ -506,7 +515,7 @@ static void test_alarm_is_a_fault_where_no_status_tells(void)
 {
     map.fault_when.mask = 0;
     enable();
-    slave.drive[2].is_faulty = true;
+    register_drive_fault(&slave.twin[2], MODBUS_DRIVES_ALARM);
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(0x0E21, feedback[2].fault_code);
@@ -516,16 +525,16 @@ static void test_alarm_is_a_fault_where_no_status_tells(void)
 static void test_fault_code_of_the_drive_may_be_any(void)
 {
     map.fault_when = (canraw_when_t){0, 0xFFFF};
-    slave.drive[2].is_homed = false;
+    slave.twin[2].is_homed = false;
     cycles(100);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(1, feedback[2].fault_code);
     setUp();
     map.feedback.block[0].field[2] = (modbus_drive_field_t){MODBUS_DRIVE_ALARM, 2, 2, false, false};
-    slave.drive[2].is_faulty = true;
+    register_drive_fault(&slave.twin[2], MODBUS_DRIVES_ALARM);
     cycles(100);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
-    TEST_ASSERT_EQUAL_HEX32((uint32_t)slave.device[2].holding[3] << 16 | 0x0E21, feedback[2].fault_code);
+    TEST_ASSERT_EQUAL_HEX32((uint32_t)modbus_drives_register(&slave, 2, 3) << 16 | 0x0E21, feedback[2].fault_code);
     TEST_ASSERT_EQUAL_STRING("its own alarm", report_of(2).trouble);
 }
 
@@ -538,7 +547,7 @@ static void test_fault_while_being_enabled_gets_no_torque_later(void)
     while (!slave.line[0].is_busy || slave.line[0].on_wire != 2 * 2 || driver.axis[2].phase != MODBUS_DRIVE_PLACING) {
         (void)!cycle();
     }
-    slave.drive[2].is_faulty = true; /* its target is on the wire */
+    register_drive_fault(&slave.twin[2], MODBUS_DRIVES_ALARM); /* its target is on the wire */
     for (int i = 0; i < 10 && driver.axis[2].phase == MODBUS_DRIVE_PLACING; i++) {
         (void)!cycle();
     }
@@ -549,16 +558,16 @@ static void test_fault_while_being_enabled_gets_no_torque_later(void)
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL(MODBUS_DRIVE_NO_JOB, driver.axis[2].job);
     cycles(200);
-    slave.drive[2].is_faulty = false;
+    modbus_drives_command(&slave, 2, MODBUS_DRIVE_RESET);
     cycles(200);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
-    TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+    TEST_ASSERT_FALSE(slave.motor[2].has_torque);
 }
 
 static bool has_any_torque(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        if (slave.drive[k].is_enabled) {
+        if (slave.motor[k].has_torque) {
             return true;
         }
     }
@@ -573,7 +582,7 @@ static void test_fault_while_a_stop_is_on_its_way_does_not_hold_it_up(void)
         enable();
         cycles(i / 2);
         for (unsigned k = 0; k < AXES; k++) {
-            slave.drive[k].is_faulty = true;
+            register_drive_fault(&slave.twin[k], MODBUS_DRIVES_ALARM);
         }
         cycles(1);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i % 2 == 0 ? DRIVES_QUICK_STOP : DRIVES_DISABLE));
@@ -587,8 +596,8 @@ static void test_fault_while_a_stop_is_on_its_way_does_not_hold_it_up(void)
         TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
         TEST_ASSERT_FALSE(drives_is_stopping(hal));
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_EQUAL_UINT32(i % 2 == 0 ? 1 : 0, slave.drive[k].stops);
-            TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+            TEST_ASSERT_EQUAL_UINT32(i % 2 == 0 ? 1 : 0, slave.asked[k].stops);
+            TEST_ASSERT_FALSE(slave.motor[k].has_torque);
         }
     }
 }
@@ -611,7 +620,7 @@ static void assert_off_is_off(drives_request_t request)
     for (int n = 0; n < 400; n++) {
         (void)!cycle();
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_TRUE(feedback[k].is_energized || !slave.drive[k].is_enabled);
+            TEST_ASSERT_TRUE(feedback[k].is_energized || !slave.motor[k].has_torque);
         }
     }
     TEST_ASSERT_EQUAL_UINT(0, energized());
@@ -648,28 +657,28 @@ static void test_off_that_is_lost_is_told_again_when_the_drive_is_back(void)
         enable();
         cycles(20);
         TEST_ASSERT_EQUAL_UINT(AXES, energized());
-        slave.line[2].device = &slave.device[3]; /* nothing of it arrives */
-        slave.line[2].devices = 0;
+        slave.line[2].devices = 0; /* nothing of it arrives */
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
         cycles(300);
         TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
         TEST_ASSERT_EQUAL_UINT(1, energized());
-        TEST_ASSERT_TRUE(feedback[2].is_energized && slave.drive[2].is_enabled);
+        TEST_ASSERT_TRUE(feedback[2].is_energized && slave.motor[2].has_torque);
         map.item[0].value = is_refused ? 0x0204 : 0x0203;
-        slave.line[2].device = &slave.device[2];
         slave.line[2].devices = 1;
         cycles(900);
         TEST_ASSERT_EQUAL(is_refused ? DRIVE_OFFLINE : DRIVE_DISABLED, feedback[2].state);
         TEST_ASSERT_EQUAL_UINT(0, energized());
-        TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+        TEST_ASSERT_FALSE(slave.motor[2].has_torque);
     }
 }
 
 /* It takes what takes its torque away, and keeps it. */
 static void test_off_of_a_drive_that_says_otherwise_is_never_told(void)
 {
-    map.command[MODBUS_DRIVE_DISABLE].block[0].data[0] = 0x5A5A; /* nothing to this drive */
     enable();
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.twin[k].is_deaf = true;
+    }
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     for (int n = 0; n < 1000; n++) {
         (void)!cycle();
@@ -714,7 +723,7 @@ static void test_off_is_not_told_by_what_a_drive_says_before_it_has_taken_it(voi
     open_shared(4000);
     await(DRIVE_DISABLED, 3000);
     for (unsigned k = 0; k < AXES; k++) {
-        slave.drive[k].is_weak = true;
+        slave.asked[k].is_weak = true;
     }
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     while (driver.axis[6].phase != MODBUS_DRIVE_CONFIRMING) {
@@ -741,20 +750,20 @@ static void test_off_after_a_fault_is_told_when_the_drive_has_taken_it(void)
 {
     map.enabled_when = (canraw_when_t){0, 0};
     enable();
-    slave.drive[2].is_faulty = true;
+    register_drive_fault(&slave.twin[2], MODBUS_DRIVES_ALARM);
     cycles(50);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
-    TEST_ASSERT_TRUE(feedback[2].is_energized && slave.drive[2].is_enabled);
+    TEST_ASSERT_TRUE(feedback[2].is_energized && slave.motor[2].has_torque);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(350);
     TEST_ASSERT_EQUAL_UINT(0, energized());
-    TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+    TEST_ASSERT_FALSE(slave.motor[2].has_torque);
 }
 
 static void test_alarm_is_the_fault_code(void)
 {
     enable();
-    slave.drive[2].is_faulty = true;
+    register_drive_fault(&slave.twin[2], MODBUS_DRIVES_ALARM);
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(0x0E21, feedback[2].fault_code);
@@ -778,17 +787,13 @@ static void move(q32_t per_cycle_q32, int more, int count)
 static void test_enable_target_last_begins_where_the_drive_is_now(void)
 {
     map.is_target_last = true;
-    for (unsigned k = 0; k < AXES; k++) {
-        slave.device[k].holding[10] = (uint16_t)((uint32_t)wide_counts(START_MM) >> 16);
-        slave.device[k].holding[11] = (uint16_t)wide_counts(START_MM);
-    }
     enable();
     move(MM(1) / 50, 0, 50);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     await(DRIVE_DISABLED, 200);
     for (unsigned k = 0; k < AXES; k++) {
-        modbus_slave_place(&slave, k, slave.drive[k].position - 10000);
-        slave.drive[k].is_frozen = true;
+        modbus_drives_place(&slave, k, register_drive_count(&slave.twin[k]) - 10000);
+        slave.motor[k].is_jammed = true;
     }
     cycles(400);
     follow_actual();
@@ -807,11 +812,11 @@ static void test_slow_line_gets_the_newest_setpoint_and_no_backlog(void)
     TEST_ASSERT_UINT32_WITHIN(3, 250, transactions);  /* the line is never asked for more than it has time for */
     TEST_ASSERT_TRUE(slave.line[0].replaced > 1000u); /* what waited was replaced by what was newer */
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_UINT32_WITHIN(4, 1000 / 56 + 0, slave.drive[k].targets);
+        TEST_ASSERT_UINT32_WITHIN(4, 1000 / 56 + 0, slave.asked[k].targets);
     }
     cycles(180); /* three rounds: the mean, its turn, the way there */
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM + 20), slave.drive[k].target);
+        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM + 20), slave.asked[k].target);
     }
 }
 
@@ -840,11 +845,11 @@ static void test_slow_line_paces_all_axes_alike(void)
     cycles(500);
     move(MM(1) / 10, 4, 400);
     TEST_ASSERT_TRUE(driver.paced > 300);
-    const int32_t slow = wide_counts(START_MM) - slave.drive[1].target;
-    const int32_t fast = wide_counts(START_MM) - slave.drive[0].target;
+    const int32_t slow = wide_counts(START_MM) - slave.asked[1].target;
+    const int32_t fast = wide_counts(START_MM) - slave.asked[0].target;
     TEST_ASSERT_INT32_WITHIN(4 * 10000 / 3, slow * 12 / 8, fast); /* their proportion, but for one set-point */
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_LESS_THAN_INT32(5 * 10000 / 3, slave.drive[k].largest_step);
+        TEST_ASSERT_LESS_THAN_INT32(5 * 10000 / 3, slave.asked[k].largest_step);
     }
 }
 
@@ -869,10 +874,10 @@ static void test_speed_register_fits_the_period_of_the_line(void)
     cycles(500);
     move(MM(1) / 20, 0, 600);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_UINT16_WITHIN(60, 562, slave.drive[k].speed);
+        TEST_ASSERT_UINT16_WITHIN(60, 562, slave.asked[k].speed);
     }
     cycles(200);
-    TEST_ASSERT_EQUAL_UINT16(0, slave.drive[0].speed);
+    TEST_ASSERT_EQUAL_UINT16(0, slave.asked[0].speed);
 }
 
 /* 50 mm/s again, but a drive that takes more than 40 mm/s for an alarm. */
@@ -886,7 +891,7 @@ static void test_speed_register_keeps_below_its_limit(void)
     cycles(500);
     move(MM(1) / 20, 0, 600);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT16(400, slave.drive[k].speed);
+        TEST_ASSERT_EQUAL_UINT16(400, slave.asked[k].speed);
     }
 }
 
@@ -903,8 +908,8 @@ static void test_smoothing_takes_out_what_the_line_cannot_carry(void)
             setpoint_q32[k] = middle_q32 + (i / 4 % 2 == 0 ? MM(1) / 4 : -MM(1) / 4);
         }
         TEST_ASSERT_EQUAL(HV_OK, cycle());
-        low = i > 200 && slave.drive[0].target < low ? slave.drive[0].target : low;
-        high = i > 200 && slave.drive[0].target > high ? slave.drive[0].target : high;
+        low = i > 200 && slave.asked[0].target < low ? slave.asked[0].target : low;
+        high = i > 200 && slave.asked[0].target > high ? slave.asked[0].target : high;
     }
     TEST_ASSERT_TRUE(high - low < 10000 / 3 / 8); /* 0.5 mm from top to bottom, sampled: now less than a quarter of it */
 }
@@ -920,15 +925,16 @@ static void test_blocks_of_a_setpoint_go_out_whole(void)
         {{1, 1, 1, 0, {0}, {{MODBUS_DRIVE_STATUS, 0, 1, false, false}}},
          {2, 3, 2, 0, {0}, {{MODBUS_DRIVE_POSITION, 0, 2, true, false}, {MODBUS_DRIVE_ALARM, 2, 1, false, false}}}}};
     open_slaves(false, false, 300);
+    slave.map.setpoint = map.setpoint;
     enable();
     move(MM(1) / 20, 0, 400);
     cycles(100);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM + 20), slave.drive[k].target);
+        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM + 20), slave.asked[k].target);
     }
     move(MM(1) / 20, 0, 200);
-    TEST_ASSERT_UINT16_WITHIN(60, 562, slave.drive[3].speed);
-    slave.drive[2].is_faulty = true;
+    TEST_ASSERT_UINT16_WITHIN(60, 562, slave.asked[3].speed);
+    register_drive_fault(&slave.twin[2], MODBUS_DRIVES_ALARM);
     cycles(20);
     TEST_ASSERT_EQUAL_HEX32(0x0E21, feedback[2].fault_code);
 }
@@ -940,10 +946,11 @@ static void test_setpoint_of_two_registers_on_drives_that_take_single_ones(void)
     map.setpoint.block[0].count = 2;
     map.setpoint.block[0].data[1] = 1; /* torque stays on */
     open_slaves(true, false, 300);
+    slave.map.setpoint = map.setpoint;
     enable();
     move(-MM(1) / 20, 0, 400);
     cycles(100);
-    TEST_ASSERT_EQUAL_INT32((START_MM - 20) * 100, slave.drive[5].target);
+    TEST_ASSERT_EQUAL_INT32((START_MM - 20) * 100, slave.asked[5].target);
 }
 
 /* On both sides of zero. */
@@ -952,13 +959,13 @@ static void test_mean_of_positions_below_zero(void)
     map = modbus_maps_small(true);
     open_slaves(true, true, 300);
     for (unsigned k = 0; k < AXES; k++) {
-        modbus_slave_place(&slave, k, -1000);
+        modbus_drives_place(&slave, k, -1000);
     }
     enable();
     move(MM(1) / 50, 0, 1000);
     cycles(200);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_INT32(1000, slave.drive[k].target);
+        TEST_ASSERT_EQUAL_INT32(1000, slave.asked[k].target);
     }
 }
 
@@ -968,17 +975,17 @@ static void test_speed_that_no_number_tells_is_at_the_end_of_its_field(void)
     for (unsigned i = 0; i < 2; i++) {
         map = modbus_maps_wide(false);
         map.setpoint.block[0].field[1].is_signed = true;
-        map.axis[3].scale = (counts_scale_t){1, 1000, MODBUS_SLAVE_WIDE_ZERO};
+        map.axis[3].scale = (counts_scale_t){1, 1000, MODBUS_DRIVES_WIDE_ZERO};
         map.axis[3].speed = (counts_scale_t){INT32_MIN, 1, -1};
         map.axis[3].step_max_q32 = map.axis[3].speed_max_q32 = INT64_MAX;
         map.axis[3].following_max_q32 = map.axis[3].carry_q32 = 0;
         open_slaves(false, false, 300);
-        modbus_slave_place(&slave, 3, MODBUS_SLAVE_WIDE_ZERO);
+        modbus_drives_place(&slave, 3, MODBUS_DRIVES_WIDE_ZERO);
         enable();
         cycles(20);
         setpoint_q32[3] = i == 0 ? MM(1 << 30) : -MM(1 << 30);
         cycles(3);
-        TEST_ASSERT_EQUAL_INT16(i == 0 ? INT16_MIN : INT16_MAX, (int16_t)slave.drive[3].speed);
+        TEST_ASSERT_EQUAL_INT16(i == 0 ? INT16_MIN : INT16_MAX, (int16_t)slave.asked[3].speed);
     }
 }
 
@@ -991,7 +998,7 @@ static void test_speed_with_a_sign_has_the_direction(void)
     enable();
     cycles(500);
     move(-MM(1) / 20, 0, 600);
-    TEST_ASSERT_INT16_WITHIN(60, -562, (int16_t)slave.drive[3].speed);
+    TEST_ASSERT_INT16_WITHIN(60, -562, (int16_t)slave.asked[3].speed);
 }
 
 /* Nobody asks for anything for a while: what comes then is taken up, and no faster than a line so slow could carry. */
@@ -1001,7 +1008,7 @@ static void test_setpoints_that_pause_are_taken_up_without_a_step(void)
     cycles(100);
     for (int i = 0; i < 12000; i++) {
         now_us += CYCLE_US;
-        modbus_slave_step(&slave, now_us);
+        modbus_drives_step(&slave, now_us);
         (void)!drives_poll(hal, now_us, feedback);
     }
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
@@ -1009,8 +1016,8 @@ static void test_setpoints_that_pause_are_taken_up_without_a_step(void)
     TEST_ASSERT_TRUE(driver.paced > 0);
     cycles(500);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM) - 5000 / 3, slave.drive[k].target);
-        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 5000 / 3 + 1);
+        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM) - 5000 / 3, slave.asked[k].target);
+        TEST_ASSERT_TRUE(slave.asked[k].largest_step <= 5000 / 3 + 1);
     }
 }
 
@@ -1027,8 +1034,8 @@ static void test_setpoints_that_nobody_takes_are_no_step_when_somebody_does(void
     is_write_lost = false;
     cycles(3000);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM), slave.drive[k].target);
-        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 3 * 10000 / 3);
+        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM), slave.asked[k].target);
+        TEST_ASSERT_TRUE(slave.asked[k].largest_step <= 3 * 10000 / 3);
     }
 }
 
@@ -1049,7 +1056,7 @@ static void test_homing_on_a_slow_line_ends_at_the_zero(void)
     await(DRIVE_ENABLED, 2000);
     for (unsigned k = 0; k < AXES; k++) {
         TEST_ASSERT_TRUE(feedback[k].is_homed);
-        TEST_ASSERT_EQUAL_INT32(MODBUS_SLAVE_WIDE_ZERO, slave.drive[k].target);
+        TEST_ASSERT_EQUAL_INT32(MODBUS_DRIVES_WIDE_ZERO, slave.asked[k].target);
     }
 }
 
@@ -1074,7 +1081,7 @@ static void test_homing_failed_is_a_fault(void)
     TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_HOMING_FAILED, feedback[0].fault_code);
     TEST_ASSERT_EQUAL_STRING("homing failed", report_of(0).trouble);
     cycles(20);
-    TEST_ASSERT_FALSE(slave.drive[0].is_homing);
+    TEST_ASSERT_TRUE(slave.twin[0].state != REGISTER_HOMING);
 }
 
 /* Without blocks for it the zero is where the drive has it: seen to begin, and over. */
@@ -1083,7 +1090,7 @@ static void test_homing_without_blocks_is_homed_from_the_start(void)
     map.command[MODBUS_DRIVE_HOME].count = 0;
     map.homing_done.mask = 0;
     open_slaves(false, false, 300);
-    slave.drive[2].is_homed = false;
+    slave.twin[2].is_homed = false;
     enable();
     for (int i = 0; i < 4; i++) { /* just before and behind feedback that is newer */
         cycles(20 + i);
@@ -1092,7 +1099,7 @@ static void test_homing_without_blocks_is_homed_from_the_start(void)
         TEST_ASSERT_TRUE(are_all(DRIVE_HOMING));
         await(DRIVE_ENABLED, 100);
         TEST_ASSERT_TRUE(feedback[2].is_homed);
-        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.drive[2].target);
+        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.asked[2].target);
     }
 }
 
@@ -1164,7 +1171,7 @@ static void test_silent_drive_on_a_shared_line_leaves_the_others_alive(void)
 {
     open_shared(1000);
     enable();
-    slave.drive[5].is_on = false;
+    modbus_drives_power(&slave, 5, false);
     for (int i = 0; i < 2000 && feedback[5].state != DRIVE_OFFLINE; i++) {
         (void)!cycle();
     }
@@ -1178,7 +1185,7 @@ static void test_silent_drive_on_a_shared_line_leaves_the_others_alive(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(100);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(k == 5 ? 0 : 1, slave.drive[k].stops);
+        TEST_ASSERT_EQUAL_UINT32(k == 5 ? 0 : 1, slave.asked[k].stops);
     }
 }
 
@@ -1188,7 +1195,7 @@ static void test_quick_stop_replaces_the_setpoint_that_waits(void)
     enable();
     move(MM(1) / 50, 0, 200);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
-    const uint32_t before = slave.drive[3].targets;
+    const uint32_t before = slave.asked[3].targets;
     for (int i = 0; i < 70; i++) {
         for (unsigned k = 0; k < AXES; k++) {
             setpoint_q32[k] += MM(1) / 50;
@@ -1196,10 +1203,10 @@ static void test_quick_stop_replaces_the_setpoint_that_waits(void)
         (void)!cycle();
     }
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
-        TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+        TEST_ASSERT_EQUAL_UINT32(1, slave.asked[k].stops);
+        TEST_ASSERT_FALSE(slave.motor[k].has_torque);
     }
-    TEST_ASSERT_TRUE(slave.drive[3].targets <= before + 1);
+    TEST_ASSERT_TRUE(slave.asked[3].targets <= before + 1);
 }
 
 static void test_quick_stop_by_broadcast_reaches_all_drives_at_once(void)
@@ -1211,11 +1218,11 @@ static void test_quick_stop_by_broadcast_reaches_all_drives_at_once(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(13); /* what is on the wire, a read, and the broadcast */
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+        TEST_ASSERT_FALSE(slave.motor[k].has_torque);
     }
     cycles(100);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(slave.drive[k].stops >= 2); /* and each by itself */
+        TEST_ASSERT_TRUE(slave.asked[k].stops >= 2); /* and each by itself */
     }
 }
 
@@ -1226,7 +1233,7 @@ static void test_quick_stop_by_broadcast_at_any_time(void)
         open_shared(4000);
         map.is_broadcast = true;
         enable();
-        slave.drive[5].is_on = false;
+        modbus_drives_power(&slave, 5, false);
         for (int i = 0; i < 2000 && feedback[5].state != DRIVE_OFFLINE; i++) {
             (void)!cycle();
         }
@@ -1234,11 +1241,11 @@ static void test_quick_stop_by_broadcast_at_any_time(void)
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
         cycles(36); /* at worst one that waits for the drive that is gone */
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+            TEST_ASSERT_FALSE(slave.motor[k].has_torque);
         }
         cycles(150);
         for (unsigned k = 0; k < AXES; k++) {
-            TEST_ASSERT_TRUE(k == 5 || slave.drive[k].stops >= 2);
+            TEST_ASSERT_TRUE(k == 5 || slave.asked[k].stops >= 2);
         }
     }
 }
@@ -1250,7 +1257,7 @@ static void test_quick_stop_by_broadcast_goes_out_on_every_line(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(20);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[k].stops);
+        TEST_ASSERT_EQUAL_UINT32(2, slave.asked[k].stops);
     }
 }
 
@@ -1266,13 +1273,13 @@ static void test_quick_stop_where_the_map_has_none(void)
         enable();
         move(MM(1) / 50, 0, 50);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
-        const uint32_t targets = slave.drive[3].targets;
+        const uint32_t targets = slave.asked[3].targets;
         setpoint_q32[3] += MM(1);
         cycles(20);
         TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
-        TEST_ASSERT_EQUAL(i != 0, slave.drive[3].is_enabled);
-        TEST_ASSERT_TRUE(slave.drive[3].targets <= targets + 1); /* what was on the wire */
-        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[3].stops);
+        TEST_ASSERT_EQUAL(i != 0, slave.motor[3].has_torque);
+        TEST_ASSERT_TRUE(slave.asked[3].targets <= targets + 1); /* what was on the wire */
+        TEST_ASSERT_EQUAL_UINT32(0, slave.asked[3].stops);
     }
 }
 
@@ -1282,7 +1289,7 @@ static void test_reset_waits_for_the_stop(void)
     open_shared(4000);
     map.axis[2].following_max_q32 = MM(3);
     enable();
-    slave.drive[2].is_frozen = true;
+    slave.motor[2].is_jammed = true;
     for (int i = 0; i < 1000 && feedback[2].state != DRIVE_FAULT; i++) {
         move(MM(1) / 50, 0, 1);
     }
@@ -1290,12 +1297,12 @@ static void test_reset_waits_for_the_stop(void)
     bool was_reset = false;
     for (int i = 0; i < 900 && feedback[2].state == DRIVE_FAULT; i++) {
         was_reset |= driver.axis[2].job == MODBUS_DRIVE_JOB_COMMAND && driver.axis[2].command == MODBUS_DRIVE_RESET;
-        TEST_ASSERT_TRUE(!was_reset || slave.drive[2].stops == 1);
+        TEST_ASSERT_TRUE(!was_reset || slave.asked[2].stops == 1);
         (void)!cycle();
     }
     TEST_ASSERT_TRUE(was_reset);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
-    TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+    TEST_ASSERT_FALSE(slave.motor[2].has_torque);
 }
 
 /* Until the drive has taken what stops it, and `disable` behind that, it is not enabled; a reset that waits for long is given up.
@@ -1307,11 +1314,6 @@ static void test_stop_comes_before_torque_and_reset(void)
         open_slaves(false, false, 300);
         slave.is_holding_on_stop = true;
         slave.glide_takes_us = 4000000;
-        slave.glide_counts = 60;
-        for (unsigned k = 0; k < AXES; k++) {
-            slave.device[k].holding[10] = (uint16_t)((uint32_t)wide_counts(START_MM) >> 16);
-            slave.device[k].holding[11] = (uint16_t)wide_counts(START_MM);
-        }
         enable();
         cycles(20);
         setpoint_q32[2] += MM(50);
@@ -1322,7 +1324,7 @@ static void test_stop_comes_before_torque_and_reset(void)
         for (int i = 0; i < 5000 && has_any_torque(); i++) {
             (void)!cycle();
             TEST_ASSERT_TRUE(drives_is_stopping(hal) || !has_any_torque());
-            TEST_ASSERT_TRUE(!slave.drive[0].is_enabled || drives_request_one(hal, 0, DRIVES_ENABLE) == HV_ERR_AGAIN);
+            TEST_ASSERT_TRUE(!slave.motor[0].has_torque || drives_request_one(hal, 0, DRIVES_ENABLE) == HV_ERR_AGAIN);
         }
         TEST_ASSERT_FALSE(has_any_torque());
         cycles(50);
@@ -1341,7 +1343,7 @@ static void test_stop_without_disable_is_not_replaced(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     cycles(200);
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
+        TEST_ASSERT_EQUAL_UINT32(1, slave.asked[k].stops);
     }
 }
 
@@ -1349,7 +1351,7 @@ static void test_stop_without_disable_is_not_replaced(void)
 static void test_position_beyond_all_millimetres_is_not_taken(void)
 {
     map.axis[2].scale = (counts_scale_t){1, 1, INT32_MIN};
-    modbus_slave_place(&slave, 2, INT32_MAX);
+    modbus_drives_place(&slave, 2, INT32_MAX);
     cycles(100);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
     TEST_ASSERT_FALSE(feedback[2].has_actual);
@@ -1358,33 +1360,33 @@ static void test_position_beyond_all_millimetres_is_not_taken(void)
 
 static void test_setpoint_that_has_no_counts_is_a_fault(void)
 {
-    map.axis[2].scale = (counts_scale_t){INT32_MIN, 1, MODBUS_SLAVE_WIDE_ZERO};
+    map.axis[2].scale = (counts_scale_t){INT32_MIN, 1, MODBUS_DRIVES_WIDE_ZERO};
     map.axis[2].step_max_q32 = INT64_MAX;
     map.axis[2].following_max_q32 = map.axis[2].carry_q32 = 0;
-    modbus_slave_place(&slave, 2, MODBUS_SLAVE_WIDE_ZERO);
+    modbus_drives_place(&slave, 2, MODBUS_DRIVES_WIDE_ZERO);
     enable();
     cycles(20);
-    const int32_t target = slave.drive[2].target;
+    const int32_t target = slave.asked[2].target;
     setpoint_q32[2] = INT64_MIN;
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_FOLLOWING, feedback[2].fault_code);
     TEST_ASSERT_TRUE(feedback[2].guard.jump_q32 > 0);
-    TEST_ASSERT_EQUAL_INT32(target, slave.drive[2].target);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].stops);
+    TEST_ASSERT_EQUAL_INT32(target, slave.asked[2].target);
+    TEST_ASSERT_EQUAL_UINT32(1, slave.asked[2].stops);
 }
 
 static void test_setpoint_far_from_a_drive_that_hangs_is_a_fault(void)
 {
     map.axis[2].following_max_q32 = MM(3);
     enable();
-    slave.drive[2].is_frozen = true;
+    slave.motor[2].is_jammed = true;
     move(MM(1) / 50, 0, 300);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_FOLLOWING, feedback[2].fault_code);
     TEST_ASSERT_TRUE(feedback[2].guard.jump_q32 == 0 && feedback[2].guard.lag_q32 > MM(3));
     TEST_ASSERT_EQUAL_INT64(MM(3), feedback[2].guard.allowed_q32);
-    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].stops);
+    TEST_ASSERT_EQUAL_UINT32(1, slave.asked[2].stops);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(320);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
@@ -1394,12 +1396,12 @@ static void test_reset_of_a_drive_that_stays_faulty_ends_in_fault(void)
 {
     await(DRIVE_DISABLED, 100);
     map.command[MODBUS_DRIVE_RESET].count = 0;
-    slave.drive[1].is_faulty = true;
+    register_drive_fault(&slave.twin[1], MODBUS_DRIVES_ALARM);
     cycles(20);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(1100);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
-    slave.drive[1].is_faulty = false;
+    modbus_drives_command(&slave, 1, MODBUS_DRIVE_RESET);
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state); /* nothing comes back by itself */
 }
@@ -1413,12 +1415,12 @@ static void test_setpoint_that_does_not_fit_its_register_is_a_fault(void)
     }
     open_slaves(true, true, 150);
     for (unsigned k = 0; k < AXES; k++) {
-        modbus_slave_place(&slave, k, 32700);
+        modbus_drives_place(&slave, k, 32700);
     }
     enable();
     move(MM(1) / 10, 0, 50); /* 327.67 mm are the end of 16 bits */
     TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
-    TEST_ASSERT_TRUE(slave.drive[0].target <= 32767 && slave.drive[0].target >= 32700);
+    TEST_ASSERT_TRUE(slave.asked[0].target <= 32767 && slave.asked[0].target >= 32700);
 }
 
 /* --- Maps --- */
@@ -1426,7 +1428,7 @@ static void test_setpoint_that_does_not_fit_its_register_is_a_fault(void)
 static hv_status_t init_status(void)
 {
     hal_modbus_t line[DRIVES_MAX];
-    modbus_slave_lines(&slave, line);
+    modbus_drives_lines(&slave, line);
     return modbus_drive_init(&driver, &map, line);
 }
 
@@ -1551,7 +1553,7 @@ static void test_init_map_that_contradicts_itself_is_refused(void)
 static void test_init_line_that_is_missing_is_refused(void)
 {
     hal_modbus_t line[DRIVES_MAX];
-    modbus_slave_lines(&slave, line);
+    modbus_drives_lines(&slave, line);
     line[4].ops = NULL;
     TEST_ASSERT_EQUAL(HV_ERR_ARG, modbus_drive_init(&driver, &map, line));
 }

@@ -166,6 +166,21 @@ static void test_fault_is_shown_until_reset_or_mend(void)
     TEST_ASSERT_EQUAL(0, put_one(CONTROL, 128));
     TEST_ASSERT_EQUAL(0, put_one(CONTROL, 0));
     TEST_ASSERT_EQUAL(0, get(STATUS));
+    m_twin.modbus.drive[1].is_torque_kept = true;
+    TEST_ASSERT_EQUAL(0, put_one(CONTROL, 1));
+    act("fault 2 0x31");
+    TEST_ASSERT_EQUAL(9, get(STATUS));
+    TEST_ASSERT_EQUAL(0, put_one(CONTROL, 0));
+    TEST_ASSERT_EQUAL(8, get(STATUS));
+}
+
+static void test_a_map_without_a_speed_moves_at_the_usual_one(void)
+{
+    m_twin.modbus.map.setpoint.block[0].fields = 1;
+    TEST_ASSERT_EQUAL(0, put_one(CONTROL, 1));
+    TEST_ASSERT_EQUAL(0, put_target(60, 0));
+    run(400000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 60, twin_position(&m_twin, 1));
 }
 
 static void test_watchdog_stops_what_hears_nothing(void)
@@ -274,6 +289,7 @@ int main(void)
     RUN_TEST(test_old_target_moves_it_when_torque_comes);
     RUN_TEST(test_writes_that_the_map_lacks_are_exceptions);
     RUN_TEST(test_fault_is_shown_until_reset_or_mend);
+    RUN_TEST(test_a_map_without_a_speed_moves_at_the_usual_one);
     RUN_TEST(test_watchdog_stops_what_hears_nothing);
     RUN_TEST(test_answers_are_spoilt_so_many_times);
     RUN_TEST(test_register_is_held_until_mend);
