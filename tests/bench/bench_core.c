@@ -8,7 +8,7 @@
  *   bench_core NAME COUNT         COUNT runs in bench_region(), for callgrind --toggle-collect=bench_region*
  */
 #include "bench_gateway.h"
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "heave/cia402.h"
 
 #include <math.h>
@@ -48,7 +48,7 @@ typedef struct {
     sim_can_t master;
     cia402_config_t can_config;
     cia402_t can;
-    canopen_twin_t drives; /**< brings the driver up; afterwards the bench answers for it, at less cost */
+    canopen_drives_t drives; /**< brings the driver up; afterwards the bench answers for it, at less cost */
     drive_feedback_t feedback[DRIVES_MAX];
     can_frame_t answer[DRIVES_MAX]; /**< what each drive says to SYNC */
     uint64_t random;
@@ -233,7 +233,7 @@ static void drive_cycle(bench_t *b)
 
 static void come_up_cycle(bench_t *b)
 {
-    canopen_twin_step(&b->drives, b->now_us += BUS_CYCLE_US);
+    canopen_drives_step(&b->drives, b->now_us += BUS_CYCLE_US);
     drive_cycle(b);
 }
 
@@ -268,7 +268,7 @@ static void set_up_can(bench_t *b)
     hal_can_filter_t filter[CIA402_FILTERS_MAX];
     configure_can(b);
     sim_can_bus_init(&b->bus, 0, NULL, 0);
-    canopen_twin_open(&b->drives, &b->bus);
+    canopen_drives_open(&b->drives, &b->bus);
     const uint32_t filters = cia402_filters(&b->can_config, filter);
     if (sim_can_open(&b->master, &b->bus, filter, filters) != HV_OK ||
         cia402_init(&b->can, &b->can_config, sim_can_hal(&b->master)) != HV_OK) {

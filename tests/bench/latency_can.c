@@ -12,7 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "latency_drives.h"
 
 #define SYNC       0x080u
@@ -27,7 +27,7 @@ static struct {
     int link;
     sim_can_bus_t bus;
     sim_can_t gate; /* on which what comes from the interface enters, and what drives say leaves */
-    canopen_twin_t twin;
+    canopen_drives_t twin;
     uint8_t target[DRIVES][RPDO_BYTES - 2];
     pthread_t thread;
 } s_can;
@@ -45,7 +45,7 @@ static void let_drives_work(void)
 {
     can_frame_t frame;
     uint64_t at_us = 0;
-    canopen_twin_step(&s_can.twin, wall_ns() / 1000u);
+    canopen_drives_step(&s_can.twin, wall_ns() / 1000u);
     while (hal_can_recv(sim_can_hal(&s_can.gate), &frame, &at_us) == HV_OK) {
         if (!frame.is_error) {
             send_frame(&frame);
@@ -124,15 +124,15 @@ void start_can(const char *interface)
 {
     open_link(interface);
     sim_can_bus_init(&s_can.bus, 0, NULL, 0);
-    canopen_twin_open(&s_can.twin, &s_can.bus);
+    canopen_drives_open(&s_can.twin, &s_can.bus);
     if (sim_can_open(&s_can.gate, &s_can.bus, NULL, 0) != HV_OK) {
         fail("no bus");
     }
     const uint64_t now_us = wall_ns() / 1000u;
     s_can.twin.now_us = now_us; /* which it was at no time before */
-    for (unsigned k = 0; k < CANOPEN_TWIN_DRIVES; k++) {
-        canopen_twin_power(&s_can.twin, k, k < DRIVES);
-        canopen_twin_place(&s_can.twin, k, START);
+    for (unsigned k = 0; k < CANOPEN_DRIVES; k++) {
+        canopen_drives_power(&s_can.twin, k, k < DRIVES);
+        canopen_drives_place(&s_can.twin, k, START);
         s_can.twin.drive[k].node.drive.jump_counts = INT32_MAX;
     }
     if (pthread_create(&s_can.thread, NULL, serve, NULL) != 0) {

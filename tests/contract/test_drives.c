@@ -9,7 +9,7 @@
 
 #include "canraw_drives.h"
 #include "canraw_maps.h"
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "heave/cia402.h"
 #include "modbus_drives.h"
 #include "modbus_maps.h"
@@ -177,13 +177,13 @@ void hv_assert_failed(const char *file, int line)
 
 static sim_can_bus_t cia402_bus;
 static sim_can_t cia402_node;
-static canopen_twin_t canopen_twin;
+static canopen_drives_t canopen_drives;
 static cia402_config_t cia402_config;
 static cia402_t cia402;
 
 static void settle_cia402(uint64_t until_us)
 {
-    canopen_twin_step(&canopen_twin, until_us);
+    canopen_drives_step(&canopen_drives, until_us);
 }
 
 static void configure_cia402(cia402_mode_t mode, uint32_t period_us)
@@ -217,10 +217,10 @@ static bool start_cia402(drives_t *drives, cia402_mode_t mode, uint32_t period_u
     hal_can_filter_t filter[CIA402_FILTERS_MAX];
     drive_state_t last = DRIVE_OFFLINE;
     sim_can_bus_init(&cia402_bus, 0, NULL, 0);
-    canopen_twin_open(&canopen_twin, &cia402_bus);
+    canopen_drives_open(&canopen_drives, &cia402_bus);
     configure_cia402(mode, period_us);
     for (uint8_t k = 0; k < AXES; k++) {
-        canopen_twin_place(&canopen_twin, k, 5000 * k + (k % 2 ? -1000 : 1000) * (100 + 10 * k));
+        canopen_drives_place(&canopen_drives, k, 5000 * k + (k % 2 ? -1000 : 1000) * (100 + 10 * k));
     }
     const uint32_t filters = cia402_filters(&cia402_config, filter);
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&cia402_node, &cia402_bus, filter, filters));
@@ -261,7 +261,7 @@ static bool open_cia402_pp(drives_t *drives)
 
 static void fault_cia402(uint8_t axis)
 {
-    canopen_twin_fault(&canopen_twin, axis, 0x2310);
+    canopen_drives_fault(&canopen_drives, axis, 0x2310);
     for (uint32_t i = 0; i < cia402_config.period_us / CYCLE_US; i++) { /* the next SYNC tells */
         now_us += CYCLE_US;
         settle_cia402(now_us);
@@ -272,21 +272,21 @@ static void fault_cia402(uint8_t axis)
 
 static void power_cia402(uint8_t axis, bool is_on)
 {
-    canopen_twin_power(&canopen_twin, axis, is_on);
+    canopen_drives_power(&canopen_drives, axis, is_on);
 }
 
 /* Operation enabled, quick stop, fault reaction. */
 static bool has_torque_cia402(uint8_t axis)
 {
-    const uint16_t status = canopen_twin.drive[axis].node.drive.state;
+    const uint16_t status = canopen_drives.drive[axis].node.drive.state;
     return status == 0x27 || status == 0x07 || status == 0x0F;
 }
 
 static void glide_cia402(uint32_t for_us)
 {
     for (uint8_t k = 0; k < AXES; k++) {
-        canopen_twin.drive[k].glide_us = for_us;
-        canopen_twin.drive[k].glide_counts = 20;
+        canopen_drives.drive[k].glide_us = for_us;
+        canopen_drives.drive[k].glide_counts = 20;
     }
 }
 

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "can_tap.h"
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "drive_run.h"
 #include "heave/cia402.h"
 
@@ -25,7 +25,7 @@
 typedef struct {
     sim_can_bus_t bus;
     sim_can_t node;
-    canopen_twin_t twin;
+    canopen_drives_t twin;
     can_tap_t tap;
     cia402_t driver;
     drive_run_t run;
@@ -125,7 +125,7 @@ static void cycle(void *world)
     world_t *self = world;
     drive_run_t *run = &self->run;
     run->now_us += CYCLE_US;
-    canopen_twin_step(&self->twin, run->now_us);
+    canopen_drives_step(&self->twin, run->now_us);
     const hv_status_t status = drives_poll(run->drives, run->now_us, run->feedback);
     FUZZ_REQUIRE(status == HV_OK || status == HV_ERR_IO);
     check_report(self, status);
@@ -174,7 +174,7 @@ static void bring_up(unsigned i)
     memset(self, 0, sizeof *self);
     self->run.now_us = 5000000;
     sim_can_bus_init(&self->bus, 0, NULL, 0);
-    canopen_twin_open(&self->twin, &self->bus);
+    canopen_drives_open(&self->twin, &self->bus);
     FUZZ_REQUIRE(sim_can_open(&self->node, &self->bus, filter, cia402_filters(&m_config, filter)) == HV_OK);
     self->tap = (can_tap_t){.inner = sim_can_hal(&self->node), .watcher = self, .sent = see_sent, .received = see_received};
     FUZZ_REQUIRE(cia402_init(&self->driver, &m_config, can_tap_hal(&self->tap)) == HV_OK);
@@ -259,16 +259,16 @@ static void receive(world_t *self, const can_frame_t *frame)
 
 static void disturb(world_t *self, const record_t *record)
 {
-    canopen_twin_drive_t *drive = &self->twin.drive[record->drive];
+    canopen_drive_t *drive = &self->twin.drive[record->drive];
     switch (record->kind % 8) {
     case 0:
-        canopen_twin_fault(&self->twin, record->drive, (uint16_t)(record->data[0] | record->data[1] << 8));
+        canopen_drives_fault(&self->twin, record->drive, (uint16_t)(record->data[0] | record->data[1] << 8));
         break;
     case 1:
-        canopen_twin_power(&self->twin, record->drive, record->data[0] % 2 != 0);
+        canopen_drives_power(&self->twin, record->drive, record->data[0] % 2 != 0);
         break;
     case 2:
-        canopen_twin_drop(&self->twin, record->drive);
+        canopen_drives_drop(&self->twin, record->drive);
         break;
     case 3:
         drive->node.is_mute = record->data[0] % 2 != 0;

@@ -13,12 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "heave/cia402.h"
 #include "rig.h"
 
 #define KILLS_DEFAULT  1000
-#define AXES           CANOPEN_TWIN_DRIVES
+#define AXES           CANOPEN_DRIVES
 #define CYCLE_US       1000u
 #define PERIOD_US      4000u
 #define FRAME_US       110u /* on the wire, at 1 Mbit/s */
@@ -33,7 +33,7 @@ static struct {
     cia402_config_t config;
     sim_can_bus_t bus;
     sim_can_t node;
-    canopen_twin_t twin;
+    canopen_drives_t twin;
     cia402_t driver;
     gateway_t gateway;
     sim_udp_t udp;
@@ -148,7 +148,7 @@ static void start(void)
 
 /* ---- judgement, at the drives ---- */
 
-static void judge_target(unsigned k, const canopen_twin_drive_t *drive)
+static void judge_target(unsigned k, const canopen_drive_t *drive)
 {
     const int32_t from = m_seen[k].is_first ? m_seen[k].position : m_seen[k].target;
     const int32_t step = abs(drive->last_target - from);
@@ -169,7 +169,7 @@ static void judge_target(unsigned k, const canopen_twin_drive_t *drive)
 static void judge(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        const canopen_twin_drive_t *drive = &m.twin.drive[k];
+        const canopen_drive_t *drive = &m.twin.drive[k];
         if (drive->node.drive.enabled != m_seen[k].enabled) {
             m_seen[k].is_first = true;
             m_enabled++;
@@ -179,7 +179,7 @@ static void judge(void)
         }
         m_seen[k].enabled = drive->node.drive.enabled;
         m_seen[k].setpoints = drive->setpoints;
-        m_seen[k].position = canopen_twin_position(&m.twin, k);
+        m_seen[k].position = canopen_drives_position(&m.twin, k);
         m_seen[k].target = drive->last_target;
     }
 }
@@ -188,7 +188,7 @@ static void judge(void)
 static void cycle(void)
 {
     m.now_us += CYCLE_US;
-    canopen_twin_step(&m.twin, m.now_us);
+    canopen_drives_step(&m.twin, m.now_us);
     judge();
     if (m.is_alive) {
         gateway_cycle(&m.gateway, m.now_us);
@@ -307,12 +307,12 @@ static void suffer(void)
 {
     const unsigned k = below(AXES);
     if (below(3) == 0) {
-        canopen_twin_place(&m.twin, k, canopen_twin_position(&m.twin, k) + (int32_t)below(4001) - 2000);
-        m_seen[k].position = canopen_twin_position(&m.twin, k);
+        canopen_drives_place(&m.twin, k, canopen_drives_position(&m.twin, k) + (int32_t)below(4001) - 2000);
+        m_seen[k].position = canopen_drives_position(&m.twin, k);
         m_sagged++;
     }
     if (below(8) == 0) {
-        canopen_twin_power(&m.twin, below(AXES), true);
+        canopen_drives_power(&m.twin, below(AXES), true);
         m_without_power++;
     }
 }
@@ -346,11 +346,11 @@ static void power_up(void)
 {
     m.now_us = 5000000;
     sim_can_bus_init(&m.bus, FRAME_US, NULL, 0);
-    canopen_twin_open(&m.twin, &m.bus);
+    canopen_drives_open(&m.twin, &m.bus);
     sim_inputs_init(&m.inputs, INPUT_ESTOP);
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_place(&m.twin, k, k < 6 ? SETTLED_COUNTS : 0);
-        m_seen[k].position = canopen_twin_position(&m.twin, k);
+        canopen_drives_place(&m.twin, k, k < 6 ? SETTLED_COUNTS : 0);
+        m_seen[k].position = canopen_drives_position(&m.twin, k);
     }
 }
 

@@ -7,17 +7,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "unity.h"
 
-#define AXES     CANOPEN_TWIN_DRIVES
+#define AXES     CANOPEN_DRIVES
 #define CYCLE_US 1000u
 #define PERIOD   4u /* cycles */
 #define MM(x)    ((q32_t)(x)*Q32_ONE)
 
 static sim_can_bus_t bus;
 static sim_can_t node;
-static canopen_twin_t twin;
+static canopen_drives_t twin;
 static cia402_config_t config;
 static cia402_t driver;
 static drives_t hal;
@@ -29,7 +29,7 @@ static unsigned absolute; /* the axis that has no zero to find */
 static hv_status_t cycle(void)
 {
     now_us += CYCLE_US;
-    canopen_twin_step(&twin, now_us);
+    canopen_drives_step(&twin, now_us);
     const hv_status_t status = drives_poll(hal, now_us, feedback);
     (void)!drives_send(hal, now_us, setpoint_q32);
     return status;
@@ -96,12 +96,12 @@ void setUp(void)
     memset(setpoint_q32, 0, sizeof setpoint_q32);
     absolute = 6;
     sim_can_bus_init(&bus, 0, NULL, 0);
-    canopen_twin_open(&twin, &bus);
+    canopen_drives_open(&twin, &bus);
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_place(&twin, k, 100000 + 1000 * (int32_t)k);
-        canopen_twin_object(&twin, k, 0x60E3, 0)->value = 3; /* methods of homing: 35, 17, 37 */
-        canopen_twin_object(&twin, k, 0x60E3, 2)->value = 17;
-        canopen_twin_object(&twin, k, 0x60E3, 3)->value = 37;
+        canopen_drives_place(&twin, k, 100000 + 1000 * (int32_t)k);
+        canopen_drives_object(&twin, k, 0x60E3, 0)->value = 3; /* methods of homing: 35, 17, 37 */
+        canopen_drives_object(&twin, k, 0x60E3, 2)->value = 17;
+        canopen_drives_object(&twin, k, 0x60E3, 3)->value = 37;
     }
     configure();
 }
@@ -201,7 +201,7 @@ static unsigned count_sent(uint32_t id, const uint8_t *data, uint8_t length)
 
 static unsigned place(unsigned drive, uint32_t object, unsigned from)
 {
-    const canopen_twin_drive_t *d = &twin.drive[drive];
+    const canopen_drive_t *d = &twin.drive[drive];
     for (unsigned i = from; i < d->logged; i++) {
         if (d->log[i] == object) {
             return i;
@@ -221,16 +221,16 @@ static void test_setup_pdos_are_mapped_in_the_order_every_stack_accepts(void)
         for (size_t i = 0; i < sizeof k_order / sizeof k_order[0]; i++) {
             at = place(k, k_order[i], at) + 1;
         }
-        TEST_ASSERT_EQUAL_HEX32(0x200 + k + 1, canopen_twin_object(&twin, k, 0x1400, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x40000180 + k + 1, canopen_twin_object(&twin, k, 0x1800, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x80000300 + k + 1, canopen_twin_object(&twin, k, 0x1401, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0xC0000280 + k + 1, canopen_twin_object(&twin, k, 0x1801, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, k, 0x1600, 2)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x7F0096, canopen_twin_object(&twin, k, 0x1016, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(4, canopen_twin_object(&twin, k, 0x60C2, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0xFD, canopen_twin_object(&twin, k, 0x60C2, 2)->value);
-        TEST_ASSERT_EQUAL_HEX32(2, canopen_twin_object(&twin, k, 0x605A, 0)->value);
-        TEST_ASSERT_EQUAL_HEX32(10000, canopen_twin_object(&twin, k, 0x6065, 0)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x200 + k + 1, canopen_drives_object(&twin, k, 0x1400, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x40000180 + k + 1, canopen_drives_object(&twin, k, 0x1800, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x80000300 + k + 1, canopen_drives_object(&twin, k, 0x1401, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0xC0000280 + k + 1, canopen_drives_object(&twin, k, 0x1801, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_drives_object(&twin, k, 0x1600, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x7F0096, canopen_drives_object(&twin, k, 0x1016, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(4, canopen_drives_object(&twin, k, 0x60C2, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0xFD, canopen_drives_object(&twin, k, 0x60C2, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(2, canopen_drives_object(&twin, k, 0x605A, 0)->value);
+        TEST_ASSERT_EQUAL_HEX32(10000, canopen_drives_object(&twin, k, 0x6065, 0)->value);
         TEST_ASSERT_EQUAL_UINT32(1, twin.drive[k].boots); /* it has just begun anew: nothing to reset */
     }
 }
@@ -238,7 +238,7 @@ static void test_setup_pdos_are_mapped_in_the_order_every_stack_accepts(void)
 /* As it leaves its maker. */
 static void make(unsigned drive, uint16_t index, uint8_t sub, uint32_t value)
 {
-    object_t *object = canopen_twin_object(&twin, drive, index, sub);
+    object_t *object = canopen_drives_object(&twin, drive, index, sub);
     object->value = object->fallback = value;
 }
 
@@ -254,16 +254,16 @@ static void test_setup_pdo_with_a_high_number_is_switched_off_before_it_is_mappe
         config.commands = (cia402_maps_t){.count = 1, .map = {{k_numbers[i], 2, {0x60400010, 0x607A0020}}}};
         for (unsigned k = 0; k < AXES; k++) {
             twin.drive[k].node.commands = config.commands; /* in the place of the drive's fourth */
-            canopen_twin_power(&twin, k, true);
+            canopen_drives_power(&twin, k, true);
             make(k, 0x1403, 1, 0x200 + k + 1); /* on, as the maker has it */
             make(k, 0x1603, 0, 1);
             make(k, 0x1603, 2, 0);
         }
         come_up();
         TEST_ASSERT_TRUE(place(0, (uint32_t)record << 8 | 1, 0) < place(0, map << 8, 0));
-        TEST_ASSERT_EQUAL_HEX32(0x201, canopen_twin_object(&twin, 0, 0x1403, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, 0, 0x1603, 2)->value);
-        TEST_ASSERT_EQUAL_HEX32(0x80000201, canopen_twin_object(&twin, 0, 0x1400, 1)->value); /* has the same identifier */
+        TEST_ASSERT_EQUAL_HEX32(0x201, canopen_drives_object(&twin, 0, 0x1403, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_drives_object(&twin, 0, 0x1603, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x80000201, canopen_drives_object(&twin, 0, 0x1400, 1)->value); /* has the same identifier */
     }
 }
 
@@ -272,7 +272,7 @@ static void test_setup_drives_that_are_up_already_are_reset_first(void)
     start();
     for (unsigned i = 0; i < 100; i++) {
         now_us += CYCLE_US;
-        canopen_twin_step(&twin, now_us);
+        canopen_drives_step(&twin, now_us);
     }
     TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(sim_can_hal(&node))); /* their boot-up messages were heard by nobody */
     await(DRIVE_DISABLED, 5000);
@@ -295,7 +295,7 @@ static drive_report_t refusal_of(unsigned drive)
 
 static void test_setup_object_refused_names_drive_object_and_reason(void)
 {
-    canopen_twin_object(&twin, 3, 0x60C2, 1)->refusal = 0x06090030;
+    canopen_drives_object(&twin, 3, 0x60C2, 1)->refusal = 0x06090030;
     const drive_report_t r = refusal_of(3);
     TEST_ASSERT_EQUAL_UINT8(4, r.address);
     TEST_ASSERT_EQUAL_STRING("refused", r.phase);
@@ -308,7 +308,7 @@ static void test_setup_object_refused_names_drive_object_and_reason(void)
 static void test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_object(&twin, k, 0x60C2, 1)->refusal = 0x06090030;
+        canopen_drives_object(&twin, k, 0x60C2, 1)->refusal = 0x06090030;
     }
     start();
     cycles(4000);
@@ -319,7 +319,7 @@ static void test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again(void
     }
     TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_object(&twin, k, 0x60C2, 1)->refusal = 0;
+        canopen_drives_object(&twin, k, 0x60C2, 1)->refusal = 0;
     }
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     for (unsigned i = 0; i < 4000 && !are_all(DRIVE_DISABLED); i++) {
@@ -334,7 +334,7 @@ static void test_loss_all_that_start_again_are_no_lost_bus(void)
     come_up();
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_power(&twin, k, true);
+        canopen_drives_power(&twin, k, true);
         twin.drive[k].node.boot_due_us = now_us + CYCLE_US; /* sooner than three answers are missing */
     }
     while (!are_all(DRIVE_OFFLINE)) {
@@ -351,14 +351,14 @@ static void test_loss_all_silent_is_a_lost_bus_until_one_answers(void)
 {
     come_up();
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_power(&twin, k, false);
+        canopen_drives_power(&twin, k, false);
     }
     cycles(40);
     TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
     TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_DISABLE));
     cycles(2000);
     TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
-    canopen_twin_power(&twin, 3, true);
+    canopen_drives_power(&twin, 3, true);
     cycles(2000);
     TEST_ASSERT_EQUAL(HV_OK, cycle());
 }
@@ -368,7 +368,7 @@ static void test_setup_object_with_another_value_tells_both(void)
     for (unsigned k = 0; k < AXES; k++) {
         config.axis[k].identity[0] = 0x2E5;
     }
-    canopen_twin_object(&twin, 2, 0x1018, 1)->value = 0x0B0000EF; /* as large as an abort code */
+    canopen_drives_object(&twin, 2, 0x1018, 1)->value = 0x0B0000EF; /* as large as an abort code */
     const drive_report_t r = refusal_of(2);
     TEST_ASSERT_EQUAL_STRING("it holds another value", r.detail);
     TEST_ASSERT_TRUE(r.has_found);
@@ -379,8 +379,8 @@ static void test_setup_object_with_another_value_tells_both(void)
 
 static void test_setup_object_that_can_only_be_read_is_told_as_such(void)
 {
-    canopen_twin_object(&twin, 3, 0x60C2, 1)->is_read_only = true;
-    canopen_twin_object(&twin, 3, 0x60C2, 1)->value = 10;
+    canopen_drives_object(&twin, 3, 0x60C2, 1)->is_read_only = true;
+    canopen_drives_object(&twin, 3, 0x60C2, 1)->value = 10;
     const drive_report_t r = refusal_of(3);
     TEST_ASSERT_EQUAL_HEX32(0x60C201, r.object);
     TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
@@ -393,8 +393,8 @@ static void test_setup_object_that_can_only_be_read_is_told_as_such(void)
 /* Written first, checked when all of it is written. */
 static void test_setup_mapping_that_can_only_be_read_is_told_as_such(void)
 {
-    canopen_twin_object(&twin, 3, 0x1600, 2)->is_read_only = true;
-    canopen_twin_object(&twin, 3, 0x1600, 2)->value = 0x60C10120;
+    canopen_drives_object(&twin, 3, 0x1600, 2)->is_read_only = true;
+    canopen_drives_object(&twin, 3, 0x1600, 2)->value = 0x60C10120;
     const drive_report_t r = refusal_of(3);
     TEST_ASSERT_EQUAL_HEX32(0x160002, r.object);
     TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
@@ -405,21 +405,21 @@ static void test_setup_mapping_that_can_only_be_read_is_told_as_such(void)
 /* 6502h: bit 0 PP, 5 homing, 6 IP, 7 CSP. */
 static void test_setup_mode_that_a_drive_has_not_got_is_refused_before_it_is_asked_for(void)
 {
-    canopen_twin_object(&twin, 2, 0x6502, 0)->value = 0x61;
+    canopen_drives_object(&twin, 2, 0x6502, 0)->value = 0x61;
     const drive_report_t r = refusal_of(2);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_SUCH_MODE, r.code);
     TEST_ASSERT_EQUAL_HEX32(0x650200, r.object);
     TEST_ASSERT_EQUAL_HEX32(0x61, r.found);
     TEST_ASSERT_EQUAL_HEX32(0x80, r.wanted);
     TEST_ASSERT_EQUAL_STRING("a bit for each mode that it supports", r.detail);
-    TEST_ASSERT_EQUAL_UINT32(0, canopen_twin_object(&twin, 2, 0x6060, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(0, canopen_drives_object(&twin, 2, 0x6060, 0)->value);
 }
 
 static void test_setup_homing_that_a_drive_has_not_got_is_refused_where_it_is_wanted(void)
 {
     config.axis[1].homing_method = 17;
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_object(&twin, k, 0x6502, 0)->value = 0xC1;
+        canopen_drives_object(&twin, k, 0x6502, 0)->value = 0xC1;
     }
     const drive_report_t r = refusal_of(1);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_SUCH_MODE, r.code);
@@ -436,8 +436,8 @@ static void test_setup_homing_method_that_is_not_in_the_list_is_refused(void)
     TEST_ASSERT_EQUAL_HEX32(37, r.found);
     TEST_ASSERT_EQUAL_HEX32(18, r.wanted);
     TEST_ASSERT_EQUAL_STRING("the last of the methods that it supports", r.detail);
-    TEST_ASSERT_EQUAL_UINT32(0, canopen_twin_object(&twin, 4, 0x6098, 0)->value);
-    TEST_ASSERT_EQUAL_UINT32(37, canopen_twin_object(&twin, 3, 0x6098, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(0, canopen_drives_object(&twin, 4, 0x6098, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(37, canopen_drives_object(&twin, 3, 0x6098, 0)->value);
 }
 
 /* No object, 0, an empty list, a list that ends early, a method of the maker, no answer, or not asked: nothing is told, and the
@@ -448,25 +448,25 @@ static void test_setup_what_a_drive_does_not_tell_is_no_refusal(void)
         config.axis[k].homing_method = 18;
     }
     config.axis[4].homing_method = -3;
-    canopen_twin_object(&twin, 0, 0x6502, 0)->is_missing = true;
-    canopen_twin_object(&twin, 0, 0x60E3, 0)->is_missing = true;
-    canopen_twin_object(&twin, 1, 0x6502, 0)->value = 0;
-    canopen_twin_object(&twin, 1, 0x60E3, 0)->value = 0;
-    canopen_twin_object(&twin, 2, 0x60E3, 2)->is_missing = true;
-    canopen_twin_object(&twin, 3, 0x6502, 0)->is_silent = true;
-    canopen_twin_object(&twin, 3, 0x60E3, 0)->is_silent = true;
+    canopen_drives_object(&twin, 0, 0x6502, 0)->is_missing = true;
+    canopen_drives_object(&twin, 0, 0x60E3, 0)->is_missing = true;
+    canopen_drives_object(&twin, 1, 0x6502, 0)->value = 0;
+    canopen_drives_object(&twin, 1, 0x60E3, 0)->value = 0;
+    canopen_drives_object(&twin, 2, 0x60E3, 2)->is_missing = true;
+    canopen_drives_object(&twin, 3, 0x6502, 0)->is_silent = true;
+    canopen_drives_object(&twin, 3, 0x60E3, 0)->is_silent = true;
     for (unsigned k = 5; k < AXES; k++) {
-        canopen_twin_object(&twin, k, 0x60E3, 3)->value = 18;
+        canopen_drives_object(&twin, k, 0x60E3, 3)->value = 18;
     }
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(18, canopen_twin_object(&twin, 0, 0x6098, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(18, canopen_drives_object(&twin, 0, 0x6098, 0)->value);
 }
 
 static void test_setup_what_a_drive_tells_does_not_count_where_it_is_not_asked(void)
 {
     config.is_support_checked = false;
     config.axis[4].homing_method = 18;
-    canopen_twin_object(&twin, 2, 0x6502, 0)->value = 0x61;
+    canopen_drives_object(&twin, 2, 0x6502, 0)->value = 0x61;
     come_up();
 }
 
@@ -495,10 +495,10 @@ static void test_setup_position_limits_are_written_where_wanted(void)
     config.axis[1].has_limits = true;
     config.axis[1].limit_counts[0] = -5000;
     config.axis[1].limit_counts[1] = 205000;
-    canopen_twin_object(&twin, 1, 0x607D, 2)->refusal = 0x06090036; /* a second line of defence: no reason to refuse a drive */
+    canopen_drives_object(&twin, 1, 0x607D, 2)->refusal = 0x06090036; /* a second line of defence: no reason to refuse a drive */
     come_up();
-    TEST_ASSERT_EQUAL_INT32(-5000, (int32_t)canopen_twin_object(&twin, 1, 0x607D, 1)->value);
-    TEST_ASSERT_EQUAL_INT32(0, (int32_t)canopen_twin_object(&twin, 0, 0x607D, 1)->value);
+    TEST_ASSERT_EQUAL_INT32(-5000, (int32_t)canopen_drives_object(&twin, 1, 0x607D, 1)->value);
+    TEST_ASSERT_EQUAL_INT32(0, (int32_t)canopen_drives_object(&twin, 0, 0x607D, 1)->value);
 }
 
 /* --- Start-up lists --- */
@@ -527,16 +527,16 @@ static void test_startup_list_is_written_before_and_behind_everything_else(void)
     list();
     come_up();
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(50, canopen_twin_object(&twin, k, 0x2030, 1)->value);
-        TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, canopen_twin_object(&twin, k, 0x2031, 0)->value);
+        TEST_ASSERT_EQUAL_UINT32(50, canopen_drives_object(&twin, k, 0x2030, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, canopen_drives_object(&twin, k, 0x2031, 0)->value);
         TEST_ASSERT_TRUE(place(k, 0x203001, 0) < place(k, 0x101700, 0));
         TEST_ASSERT_TRUE(place(k, 0x203100, 0) > place(k, 0x60C201, 0));
         TEST_ASSERT_TRUE(place(k, 0x203100, 0) < place(k, 0x606000, 0));
     }
     const unsigned before = twin.drive[2].logged;
-    canopen_twin_power(&twin, 2, false);
+    canopen_drives_power(&twin, 2, false);
     cycles(50);
-    canopen_twin_power(&twin, 2, true);
+    canopen_drives_power(&twin, 2, true);
     cycles(2000);
     TEST_ASSERT_TRUE(place(2, 0x203001, before) < place(2, 0x203100, before)); /* again after each boot-up */
     enable();
@@ -545,7 +545,7 @@ static void test_startup_list_is_written_before_and_behind_everything_else(void)
 static void test_startup_list_that_a_drive_does_not_take_names_the_object(void)
 {
     list();
-    canopen_twin_object(&twin, 4, 0x2030, 1)->is_missing = true;
+    canopen_drives_object(&twin, 4, 0x2030, 1)->is_missing = true;
     drive_report_t r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, r.code);
     TEST_ASSERT_EQUAL_HEX32(0x203001, r.object);
@@ -553,7 +553,7 @@ static void test_startup_list_that_a_drive_does_not_take_names_the_object(void)
 
     setUp();
     list();
-    canopen_twin_object(&twin, 4, 0x2031, 0)->is_read_only = true;
+    canopen_drives_object(&twin, 4, 0x2031, 0)->is_read_only = true;
     r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(0x203100, r.object);
     TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, r.wanted);
@@ -562,12 +562,12 @@ static void test_startup_list_that_a_drive_does_not_take_names_the_object(void)
     list();
     items[0].is_checked = false; /* nothing is read back, so the refusal itself counts */
     give_list();
-    canopen_twin_object(&twin, 4, 0x2031, 0)->is_read_only = true;
+    canopen_drives_object(&twin, 4, 0x2031, 0)->is_read_only = true;
     TEST_ASSERT_EQUAL_HEX32(0x203100, refusal_of(4).object);
 
     setUp();
     list();
-    canopen_twin_object(&twin, 4, 0x2032, 0)->value = 4;
+    canopen_drives_object(&twin, 4, 0x2032, 0)->value = 4;
     r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(0x203200, r.object);
     TEST_ASSERT_EQUAL_HEX32(4, r.found);
@@ -579,11 +579,11 @@ static void test_startup_list_item_that_may_be_missing_is_passed_over(void)
     list();
     items[1].is_optional = true;
     give_list();
-    canopen_twin_object(&twin, 4, 0x2030, 1)->is_missing = true;
-    canopen_twin_object(&twin, 5, 0x2030, 1)->refusal = 0x06090030;
+    canopen_drives_object(&twin, 4, 0x2030, 1)->is_missing = true;
+    canopen_drives_object(&twin, 5, 0x2030, 1)->refusal = 0x06090030;
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(7, canopen_twin_object(&twin, 5, 0x2030, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, canopen_twin_object(&twin, 4, 0x2031, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(7, canopen_drives_object(&twin, 5, 0x2030, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, canopen_drives_object(&twin, 4, 0x2031, 0)->value);
 }
 
 static void test_startup_list_too_long_is_refused(void)
@@ -603,7 +603,7 @@ static void test_wishes_are_what_is_written(void)
     come_up();
     const uint32_t logged = twin.drive[0].logged;
     while (cia402_next_wish(&config, 0, &wish)) {
-        if (wish.is_written && canopen_twin_object(&twin, 0, wish.index, wish.sub) != NULL) {
+        if (wish.is_written && canopen_drives_object(&twin, 0, wish.index, wish.sub) != NULL) {
             (void)place(0, (uint32_t)wish.index << 8 | wish.sub, 0);
             written++;
         }
@@ -618,7 +618,7 @@ static void test_wishes_are_what_is_written(void)
 
 static void test_setup_other_profile_is_refused(void)
 {
-    canopen_twin_object(&twin, 0, 0x1000, 0)->value = 0x00020191;
+    canopen_drives_object(&twin, 0, 0x1000, 0)->value = 0x00020191;
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_402, refusal_of(0).code);
 }
 
@@ -628,12 +628,12 @@ static void test_setup_missing_guard_is_refused_unless_allowed(void)
     for (size_t i = 0; i < 5; i++) {
         const uint8_t sub = k_guards[i] == 0x1016 ? 1 : 0;
         setUp();
-        canopen_twin_object(&twin, 1, k_guards[i], sub)->is_missing = true;
+        canopen_drives_object(&twin, 1, k_guards[i], sub)->is_missing = true;
         const drive_report_t refused = refusal_of(1);
         TEST_ASSERT_EQUAL_HEX32(CIA402_UNGUARDED, refused.code);
         TEST_ASSERT_EQUAL_HEX32((uint32_t)k_guards[i] << 8 | sub, refused.object);
         setUp();
-        canopen_twin_object(&twin, 1, k_guards[i], sub)->is_missing = true;
+        canopen_drives_object(&twin, 1, k_guards[i], sub)->is_missing = true;
         config.is_unguarded_allowed = true;
         come_up();
         TEST_ASSERT_EQUAL_HEX32((uint32_t)k_guards[i] << 8 | sub, report(1).object);
@@ -654,7 +654,7 @@ static void test_setup_guard_that_cannot_be_written_is_taken_where_it_is_on(void
                   {0x1016, 1, 0x7F012C, true} /* twice of what was asked for */};
     for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         setUp();
-        object_t *row = canopen_twin_object(&twin, 1, k_rows[i].index, k_rows[i].sub);
+        object_t *row = canopen_drives_object(&twin, 1, k_rows[i].index, k_rows[i].sub);
         row->is_read_only = true;
         row->value = row->fallback = k_rows[i].value;
         if (k_rows[i].is_taken) {
@@ -671,7 +671,7 @@ static void test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allo
     for (unsigned is_allowed = 0; is_allowed < 2; is_allowed++) {
         setUp();
         config.is_unguarded_allowed = is_allowed != 0;
-        object_t *row = canopen_twin_object(&twin, 1, 0x1016, 1);
+        object_t *row = canopen_drives_object(&twin, 1, 0x1016, 1);
         row->is_read_only = true;
         row->value = row->fallback = 0x7F012D;
         if (is_allowed != 0) {
@@ -732,18 +732,18 @@ static void test_setup_optional_objects_missing_is_no_trouble(void)
 {
     static const uint16_t k_optional[] = {0x1006, 0x1019, 0x605B, 0x605C, 0x6066};
     for (size_t i = 0; i < 5; i++) {
-        canopen_twin_object(&twin, 1, k_optional[i], 0)->is_missing = true;
-        canopen_twin_object(&twin, 2, k_optional[i], 0)->is_read_only = true;
+        canopen_drives_object(&twin, 1, k_optional[i], 0)->is_missing = true;
+        canopen_drives_object(&twin, 2, k_optional[i], 0)->is_read_only = true;
     }
     come_up();
 }
 
 static void test_setup_missing_drive_is_named_and_taken_when_it_comes(void)
 {
-    canopen_twin_power(&twin, 6, false);
+    canopen_drives_power(&twin, 6, false);
     TEST_ASSERT_EQUAL_HEX32(CIA402_SILENT, refusal_of(6).code);
     TEST_ASSERT_EQUAL_STRING("missing", report(6).phase);
-    canopen_twin_power(&twin, 6, true);
+    canopen_drives_power(&twin, 6, true);
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX32(0, report(6).code);
 }
@@ -751,7 +751,7 @@ static void test_setup_missing_drive_is_named_and_taken_when_it_comes(void)
 /* It answers, only not when it is asked for that. */
 static void test_setup_object_that_is_never_answered_is_named_and_not_tried_for_ever(void)
 {
-    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = true;
+    canopen_drives_object(&twin, 2, 0x6065, 0)->is_silent = true;
     const drive_report_t r = refusal_of(2);
     TEST_ASSERT_EQUAL_STRING("refused", r.phase);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, r.code);
@@ -761,7 +761,7 @@ static void test_setup_object_that_is_never_answered_is_named_and_not_tried_for_
     TEST_ASSERT_TRUE(boots <= 3);
     cycles(10000);
     TEST_ASSERT_EQUAL_UINT32(boots, twin.drive[2].boots);
-    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = false;
+    canopen_drives_object(&twin, 2, 0x6065, 0)->is_silent = false;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
@@ -771,7 +771,7 @@ static void test_setup_object_that_is_never_answered_is_named_and_not_tried_for_
 /* While it is tried again, too: an engage would be refused for a reason. */
 static void test_setup_object_without_answer_is_named_while_it_is_tried_again(void)
 {
-    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = true;
+    canopen_drives_object(&twin, 2, 0x6065, 0)->is_silent = true;
     start();
     for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
         (void)!cycle();
@@ -785,19 +785,19 @@ static void test_setup_object_without_answer_is_named_while_it_is_tried_again(vo
 
 static void test_setup_object_that_may_be_missing_may_be_without_answer(void)
 {
-    canopen_twin_object(&twin, 2, 0x605B, 0)->is_silent = true;
+    canopen_drives_object(&twin, 2, 0x605B, 0)->is_silent = true;
     come_up();
     TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].boots);
 }
 
 static void test_setup_one_question_without_answer_is_asked_again_from_the_beginning(void)
 {
-    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = true;
+    canopen_drives_object(&twin, 2, 0x6065, 0)->is_silent = true;
     start();
     for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
         (void)!cycle();
     }
-    canopen_twin_object(&twin, 2, 0x6065, 0)->is_silent = false;
+    canopen_drives_object(&twin, 2, 0x6065, 0)->is_silent = false;
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
 }
@@ -806,7 +806,7 @@ static void test_setup_one_question_without_answer_is_asked_again_from_the_begin
 static void test_enable_drive_that_does_not_answer_for_its_mode_is_named(void)
 {
     come_up();
-    canopen_twin_object(&twin, 4, 0x6061, 0)->is_silent = true;
+    canopen_drives_object(&twin, 4, 0x6061, 0)->is_silent = true;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(8000);
     TEST_ASSERT_EQUAL_STRING("refused", report(4).phase);
@@ -819,18 +819,18 @@ static void test_setup_answers_that_come_late_do_not_confuse(void)
     twin.drive[2].is_answering_late = true;
     start();
     await(DRIVE_DISABLED, 60000);
-    TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, 2, 0x1600, 2)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x7F0096, canopen_twin_object(&twin, 2, 0x1016, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(10000, canopen_twin_object(&twin, 2, 0x6065, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_drives_object(&twin, 2, 0x1600, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x7F0096, canopen_drives_object(&twin, 2, 0x1016, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(10000, canopen_drives_object(&twin, 2, 0x6065, 0)->value);
     twin.drive[2].is_answering_late = false;
     enable();
 }
 
 static void test_setup_refused_drive_is_tried_again_by_a_reset(void)
 {
-    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0x06090030;
+    canopen_drives_object(&twin, 3, 0x6060, 0)->refusal = 0x06090030;
     (void)refusal_of(3);
-    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0;
+    canopen_drives_object(&twin, 3, 0x6060, 0)->refusal = 0;
     cycles(2000);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[3].state);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
@@ -843,16 +843,16 @@ static void test_setup_refusal_that_may_pass_is_asked_again_before_it_counts(voi
     static const uint32_t k_codes[] = {0x06010000, 0x08000021, 0x08000022};
     for (size_t i = 0; i < 3; i++) {
         setUp();
-        canopen_twin_object(&twin, 1, 0x60C2, 1)->refusal = k_codes[i];
+        canopen_drives_object(&twin, 1, 0x60C2, 1)->refusal = k_codes[i];
         start();
         for (unsigned n = 0; n < 2000 && driver.axis[1].setup.tries < 2; n++) {
             (void)!cycle();
         }
         TEST_ASSERT_EQUAL_UINT8(2, driver.axis[1].setup.tries);
-        canopen_twin_object(&twin, 1, 0x60C2, 1)->refusal = 0;
+        canopen_drives_object(&twin, 1, 0x60C2, 1)->refusal = 0;
         await(DRIVE_DISABLED, 1000);
         setUp();
-        canopen_twin_object(&twin, 1, 0x60C2, 1)->refusal = k_codes[i];
+        canopen_drives_object(&twin, 1, 0x60C2, 1)->refusal = k_codes[i];
         const drive_report_t refused = refusal_of(1);
         TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, refused.code);
         TEST_ASSERT_EQUAL_HEX32(k_codes[i], refused.detail_code);
@@ -861,14 +861,14 @@ static void test_setup_refusal_that_may_pass_is_asked_again_before_it_counts(voi
 
 static void test_setup_mode_may_show_late_but_not_never(void)
 {
-    canopen_twin_force(&twin, 1, 0x6061, 0, 0);
+    canopen_drives_force(&twin, 1, 0x6061, 0, 0);
     start();
     cycles(3000);
     TEST_ASSERT_EQUAL_HEX32(0x606100, report(1).object);
-    canopen_twin_object(&twin, 1, 0x6061, 0)->is_forced = false;
+    canopen_drives_object(&twin, 1, 0x6061, 0)->is_forced = false;
     await(DRIVE_DISABLED, 100);
     setUp();
-    canopen_twin_force(&twin, 1, 0x6061, 0, 0);
+    canopen_drives_force(&twin, 1, 0x6061, 0, 0);
     start();
     cycles(6000);
     TEST_ASSERT_EQUAL_STRING("refused", report(1).phase);
@@ -879,7 +879,7 @@ static void test_setup_mode_may_show_late_but_not_never(void)
 
 static void test_setup_drive_that_does_not_tell_its_type_is_refused(void)
 {
-    canopen_twin_object(&twin, 0, 0x1000, 0)->is_missing = true;
+    canopen_drives_object(&twin, 0, 0x1000, 0)->is_missing = true;
     const drive_report_t r = refusal_of(0);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_402, r.code);
     TEST_ASSERT_EQUAL_STRING("there is no such object", r.detail);
@@ -891,7 +891,7 @@ static void start_beside_drives_that_are_up(void)
     start();
     for (unsigned i = 0; i < 100; i++) {
         now_us += CYCLE_US;
-        canopen_twin_step(&twin, now_us);
+        canopen_drives_step(&twin, now_us);
     }
     TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(sim_can_hal(&node)));
 }
@@ -945,7 +945,7 @@ static void test_setup_drive_that_boots_in_the_midst_begins_anew(void)
         setUp();
         start();
         cycles_until_phase(1, k_phases[i]);
-        canopen_twin_power(&twin, 1, true);
+        canopen_drives_power(&twin, 1, true);
         for (unsigned n = 0; n < 100 && report(1).code == 0; n++) {
             (void)!cycle();
         }
@@ -958,10 +958,10 @@ static void test_setup_drive_that_boots_in_the_midst_begins_anew(void)
 
 static void test_setup_refused_drive_is_tried_again_when_it_boots(void)
 {
-    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0x06090030;
+    canopen_drives_object(&twin, 3, 0x6060, 0)->refusal = 0x06090030;
     (void)refusal_of(3);
-    canopen_twin_object(&twin, 3, 0x6060, 0)->refusal = 0;
-    canopen_twin_power(&twin, 3, true);
+    canopen_drives_object(&twin, 3, 0x6060, 0)->refusal = 0;
+    canopen_drives_power(&twin, 3, true);
     await(DRIVE_DISABLED, 3000);
 }
 
@@ -973,19 +973,19 @@ static void test_setup_drive_whose_position_cannot_be_read_is_refused(void)
         twin.drive[5].tpdo_cut = i == 0;
         if (i == 1) {
             config.axis[5].scale.num = 1;
-            canopen_twin_place(&twin, 5, INT32_MAX);
+            canopen_drives_place(&twin, 5, INT32_MAX);
         }
         const drive_report_t r = refusal_of(5);
         TEST_ASSERT_EQUAL_HEX32(CIA402_NO_START, r.code);
         TEST_ASSERT_EQUAL_HEX32(0, r.object);
         TEST_ASSERT_FALSE(feedback[5].has_actual);
         TEST_ASSERT_EQUAL_UINT32(2, twin.drive[5].boots); /* tried from the beginning twice */
-        canopen_twin_power(&twin, 5, true);
+        canopen_drives_power(&twin, 5, true);
         cycles(3000);
         TEST_ASSERT_EQUAL_STRING("refused", report(5).phase);
         TEST_ASSERT_EQUAL_UINT32(4, twin.drive[5].boots); /* and again when it boots */
         twin.drive[5].tpdo_cut = 0;
-        canopen_twin_place(&twin, 5, 0);
+        canopen_drives_place(&twin, 5, 0);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
         await(DRIVE_DISABLED, 3000);
     }
@@ -998,11 +998,11 @@ static void test_enable_all_together_without_a_jump(void)
     come_up();
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        const canopen_twin_drive_t *d = &twin.drive[k];
+        const canopen_drive_t *d = &twin.drive[k];
         TEST_ASSERT_EQUAL_INT32(0, d->largest_step);
         TEST_ASSERT_EQUAL_UINT32(1, d->node.drive.enabled);
         TEST_ASSERT_TRUE(d->enabled_us - twin.drive[0].enabled_us <= 10000); /* brakes of 8 to 14 ms */
-        TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, canopen_twin_position(&twin, k));
+        TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, canopen_drives_position(&twin, k));
     }
 }
 
@@ -1092,7 +1092,7 @@ static void test_enable_drive_that_shows_another_mode_gets_no_set_point(void)
 static void test_enable_drive_that_takes_no_mode_stops_all(void)
 {
     come_up();
-    canopen_twin_object(&twin, 4, 0x6060, 0)->refusal = 0x06090030;
+    canopen_drives_object(&twin, 4, 0x6060, 0)->refusal = 0x06090030;
     follow_actual();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     (void)cycles_until(4, DRIVE_FAULT, 200);
@@ -1121,7 +1121,7 @@ static void test_enable_while_enabled_changes_nothing_but_brings_back_who_fell_o
     cycles(50);
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
     TEST_ASSERT_EQUAL_UINT32(1, twin.drive[0].node.drive.enabled);
-    canopen_twin_drop(&twin, 2);
+    canopen_drives_drop(&twin, 2);
     cycles(50);
     for (unsigned k = 0; k < AXES; k++) {
         TEST_ASSERT_EQUAL(k == 2 ? DRIVE_DISABLED : DRIVE_ENABLED, feedback[k].state); /* the gateway decides */
@@ -1147,12 +1147,12 @@ static void test_send_set_points_arrive_as_counts_one_set_per_period(void)
     TEST_ASSERT_UINT32_WITHIN(2, 100, twin.drive[0].setpoints - before);
     TEST_ASSERT_EQUAL_INT32(40, twin.drive[6].largest_step);
     cycles(3 * PERIOD);
-    TEST_ASSERT_EQUAL_INT32(104000, canopen_twin_position(&twin, 0));
+    TEST_ASSERT_EQUAL_INT32(104000, canopen_drives_position(&twin, 0));
 }
 
 static void test_send_position_wraps_round_without_a_jump(void)
 {
-    canopen_twin_place(&twin, 6, INT32_MAX - 100);
+    canopen_drives_place(&twin, 6, INT32_MAX - 100);
     come_up();
     enable();
     for (int i = 0; i < 100; i++) {
@@ -1160,7 +1160,7 @@ static void test_send_position_wraps_round_without_a_jump(void)
         TEST_ASSERT_EQUAL(HV_OK, cycle());
     }
     cycles(3 * PERIOD);
-    TEST_ASSERT_EQUAL_INT32(INT32_MIN + 899, canopen_twin_position(&twin, 6));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN + 899, canopen_drives_position(&twin, 6));
     TEST_ASSERT_TRUE(feedback[6].actual_mm_q32 > MM(2147483));
 }
 
@@ -1176,7 +1176,7 @@ static void test_send_lag_beyond_the_window_is_a_fault_unless_it_is_not_watched(
         while (setpoint_q32[2] - from_q32 < MM(15) && feedback[2].state == DRIVE_ENABLED) {
             setpoint_q32[2] += MM(1) / 10;
             (void)!cycle();
-            canopen_twin_place(&twin, 2, 102000);
+            canopen_drives_place(&twin, 2, 102000);
         }
         TEST_ASSERT_EQUAL(i == 0 ? DRIVE_FAULT : DRIVE_ENABLED, feedback[2].state);
         TEST_ASSERT_EQUAL_HEX32(i == 0 ? 0x8611 : 0, feedback[2].fault_code);
@@ -1202,7 +1202,7 @@ static void test_send_set_point_that_has_no_counts_is_a_fault_and_not_sent(void)
     TEST_ASSERT_EQUAL_HEX32(0, report(2).object);
     cycles(5 * PERIOD);
     TEST_ASSERT_INT_WITHIN(2, (int)setpoints, (int)twin.drive[2].setpoints);
-    TEST_ASSERT_EQUAL_INT32(102000, canopen_twin_position(&twin, 2));
+    TEST_ASSERT_EQUAL_INT32(102000, canopen_drives_position(&twin, 2));
     TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].quick_stops);
 }
 
@@ -1256,7 +1256,7 @@ static void test_poll_boot_up_in_mid_run_is_a_loss_at_once(void)
 {
     come_up();
     enable();
-    canopen_twin_power(&twin, 2, true);
+    canopen_drives_power(&twin, 2, true);
     twin.drive[2].node.boot_due_us = now_us;
     TEST_ASSERT_TRUE(cycles_to_loss(CIA402_REBOOTED, DRIVE_OFFLINE) <= 2);
     await(DRIVE_DISABLED, 3000);
@@ -1277,7 +1277,7 @@ static void test_poll_torque_gone_by_itself_is_seen_in_a_period(void)
 {
     come_up();
     enable();
-    canopen_twin_drop(&twin, 2);
+    canopen_drives_drop(&twin, 2);
     TEST_ASSERT_TRUE(cycles_to_loss(0, DRIVE_DISABLED) <= PERIOD + 1);
     TEST_ASSERT_EQUAL_HEX32(CIA402_FELL_OUT, report(2).code);
     TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].node.drive.enabled); /* nobody enables it again by itself */
@@ -1288,9 +1288,9 @@ static void test_poll_torque_gone_from_several_drives_is_told_of_each(void)
 {
     come_up();
     enable();
-    canopen_twin_drop(&twin, 2);
+    canopen_drives_drop(&twin, 2);
     cycles(2 * PERIOD);
-    canopen_twin_drop(&twin, 5);
+    canopen_drives_drop(&twin, 5);
     cycles(2 * PERIOD);
     for (unsigned k = 0; k < AXES; k++) {
         TEST_ASSERT_EQUAL(k == 2 || k == 5 ? DRIVE_DISABLED : DRIVE_ENABLED, feedback[k].state);
@@ -1303,7 +1303,7 @@ static void test_poll_fault_has_the_code_of_its_emergency(void)
 {
     come_up();
     enable();
-    canopen_twin_fault(&twin, 2, 0x3210);
+    canopen_drives_fault(&twin, 2, 0x3210);
     TEST_ASSERT_TRUE(cycles_to_loss(0x3210, DRIVE_FAULT) <= PERIOD + 1);
     TEST_ASSERT_EQUAL_STRING("over-voltage of the DC link", report(2).trouble);
 }
@@ -1313,7 +1313,7 @@ static void test_poll_fault_without_emergency_is_looked_up(void)
     come_up();
     enable();
     twin.drive[2].node.is_mute = true;
-    canopen_twin_fault(&twin, 2, 0x7305);
+    canopen_drives_fault(&twin, 2, 0x7305);
     twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     cycles(20);
@@ -1327,7 +1327,7 @@ static void test_poll_fault_without_any_code_is_a_fault_all_the_same(void)
     enable();
     twin.drive[2].node.is_sdo_silent = true;
     twin.drive[2].node.is_mute = true;
-    canopen_twin_fault(&twin, 2, 0x7305);
+    canopen_drives_fault(&twin, 2, 0x7305);
     twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     cycles(1000);
@@ -1348,7 +1348,7 @@ static void test_poll_emergency_comes_before_what_is_looked_up(void)
     enable();
     twin.drive[2].node.is_sdo_silent = true;
     twin.drive[2].node.is_mute = true;
-    canopen_twin_fault(&twin, 2, 0x7305);
+    canopen_drives_fault(&twin, 2, 0x7305);
     twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     say(0x83, 2, 0x4310); /* too short */
@@ -1371,7 +1371,7 @@ static void test_poll_fault_during_a_change_of_mode_is_looked_up_afterwards(void
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     cycles(20);
     twin.drive[2].node.is_mute = true;
-    canopen_twin_fault(&twin, 2, 0x7305);
+    canopen_drives_fault(&twin, 2, 0x7305);
     twin.drive[2].node.is_mute = false;
     twin.drive[2].node.is_sdo_silent = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
@@ -1420,17 +1420,17 @@ static void test_quick_stop_that_never_ends_ends_without_voltage(void)
     twin.drive[2].stuck_at = 0x07;
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(4900);
-    TEST_ASSERT_EQUAL_HEX16(0x0002, canopen_twin_object(&twin, 2, 0x6040, 0)->value);
+    TEST_ASSERT_EQUAL_HEX16(0x0002, canopen_drives_object(&twin, 2, 0x6040, 0)->value);
     TEST_ASSERT_EQUAL_STRING("stopping", report(2).phase);
     cycles(200);
-    TEST_ASSERT_EQUAL_HEX16(0x0000, canopen_twin_object(&twin, 2, 0x6040, 0)->value);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, canopen_drives_object(&twin, 2, 0x6040, 0)->value);
 }
 
 static void test_request_reset_twice_is_one_edge(void)
 {
     come_up();
     enable();
-    canopen_twin_fault(&twin, 2, 0x2310);
+    canopen_drives_fault(&twin, 2, 0x2310);
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(2 * PERIOD);
@@ -1445,16 +1445,16 @@ static void test_request_reset_of_a_fault_that_goes_by_itself(void)
 {
     come_up();
     enable();
-    canopen_twin_fault(&twin, 2, 0x2310);
+    canopen_drives_fault(&twin, 2, 0x2310);
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
-    canopen_twin_drop(&twin, 2);
+    canopen_drives_drop(&twin, 2);
     await(DRIVE_DISABLED, 20 * PERIOD);
     cycles(10 * PERIOD);
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
     twin.drive[2].node.is_mute = true;
-    canopen_twin_fault(&twin, 2, 0x7305);
+    canopen_drives_fault(&twin, 2, 0x7305);
     twin.drive[2].node.is_mute = false;
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     cycles(20);
@@ -1465,7 +1465,7 @@ static void test_request_reset_is_one_edge_and_only_when_asked(void)
 {
     come_up();
     enable();
-    canopen_twin_fault(&twin, 2, 0x2310);
+    canopen_drives_fault(&twin, 2, 0x2310);
     (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
     cycles(2000);
@@ -1473,7 +1473,7 @@ static void test_request_reset_is_one_edge_and_only_when_asked(void)
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     await(DRIVE_DISABLED, 100);
     TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].resets);
-    canopen_twin_fault(&twin, 2, 0x2310);
+    canopen_drives_fault(&twin, 2, 0x2310);
     cycles(500);
     TEST_ASSERT_EQUAL_UINT32(1, twin.drive[2].resets);
     TEST_ASSERT_EQUAL_UINT32(0, twin.drive[3].resets);
@@ -1483,7 +1483,7 @@ static void listen_to_silence(unsigned ms)
 {
     while (ms-- > 0) {
         now_us += CYCLE_US;
-        canopen_twin_step(&twin, now_us);
+        canopen_drives_step(&twin, now_us);
     }
 }
 
@@ -1570,7 +1570,7 @@ static void test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last(void)
     await(DRIVE_DISABLED, 5000);
     enable();
     twin.drive[2].node.is_mute = true;
-    canopen_twin_power(&twin, 4, false);
+    canopen_drives_power(&twin, 4, false);
     cycles(1000);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
     TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
@@ -1579,7 +1579,7 @@ static void test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last(void)
     cycles(500);
     TEST_ASSERT_EQUAL_UINT(2, energized());
     twin.drive[2].node.is_mute = false;
-    canopen_twin_power(&twin, 4, true);
+    canopen_drives_power(&twin, 4, true);
     while (feedback[4].is_energized) {
         (void)!cycle();
         TEST_ASSERT_TRUE(now_us < 60000000);
@@ -1597,7 +1597,7 @@ static void test_leave_drives_without_torque_forget_the_gateway(void)
     listen_to_silence(1000);
     for (unsigned k = 0; k < AXES; k++) {
         TEST_ASSERT_EQUAL_UINT32(2, twin.drive[k].boots);
-        TEST_ASSERT_EQUAL_HEX32(0, canopen_twin_object(&twin, k, 0x603F, 0)->value); /* no 8130h */
+        TEST_ASSERT_EQUAL_HEX32(0, canopen_drives_object(&twin, k, 0x603F, 0)->value); /* no 8130h */
     }
 }
 
@@ -1617,7 +1617,7 @@ static void test_leave_drives_with_torque_are_left_to_their_watchdogs(void)
 
 static void test_leave_says_nothing_to_drives_that_are_not_there(void)
 {
-    canopen_twin_power(&twin, 6, false);
+    canopen_drives_power(&twin, 6, false);
     start();
     cycles(500);
     spy();
@@ -1746,8 +1746,8 @@ static void test_sync_counter_goes_round_without_a_gap(void)
     config.sync_counter = 5;
     config.is_sync_watched = true;
     come_up();
-    TEST_ASSERT_EQUAL_HEX32(5, canopen_twin_object(&twin, 3, 0x1019, 0)->value);
-    TEST_ASSERT_EQUAL_HEX32(PERIOD * CYCLE_US, canopen_twin_object(&twin, 3, 0x1006, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(5, canopen_drives_object(&twin, 3, 0x1019, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(PERIOD * CYCLE_US, canopen_drives_object(&twin, 3, 0x1006, 0)->value);
     enable();
     spy();
     uint8_t count = 0;
@@ -1840,7 +1840,7 @@ static void test_frames_for_others_are_not_heard(void)
                                  {.id = 0x283, .length = 8}};
     const hal_can_t others = sim_can_hal(&twin.node);
     sim_can_bus_init(&bus, 0, NULL, 0);
-    canopen_twin_open(&twin, &bus);
+    canopen_drives_open(&twin, &bus);
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0)); /* without filters */
     TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, sim_can_hal(&node)));
     hal = cia402_hal(&driver);
@@ -2077,7 +2077,7 @@ static void test_bus_whose_queue_is_full_now_and_then_hinders_nothing(void)
     TEST_ASSERT_UINT32_WITHIN(5, 50, driver.sets - sets);
     for (unsigned k = 0; k < AXES; k++) {
         TEST_ASSERT_TRUE(twin.drive[k].largest_step <= 80);
-        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_twin_object(&twin, k, 0x1600, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x607A0020, canopen_drives_object(&twin, k, 0x1600, 2)->value);
     }
 }
 
@@ -2088,7 +2088,7 @@ static void test_request_quick_stop_goes_with_the_set_that_is_due(void)
     enable();
     for (unsigned i = 0; i <= PERIOD && !driver.is_open; i++) {
         now_us += CYCLE_US;
-        canopen_twin_step(&twin, now_us);
+        canopen_drives_step(&twin, now_us);
         (void)!drives_poll(hal, now_us, feedback);
     }
     TEST_ASSERT_TRUE(driver.is_open);
@@ -2111,7 +2111,7 @@ static void test_send_slow_bus_refuses_instead_of_queueing(void)
     unsigned refused = 0;
     for (int i = 0; i < 10; i++) {
         now_us += CYCLE_US;
-        canopen_twin_step(&twin, now_us);
+        canopen_drives_step(&twin, now_us);
         (void)!drives_poll(hal, now_us, feedback);
         refused += drives_send(hal, now_us, setpoint_q32) == HV_ERR_AGAIN;
         TEST_ASSERT_TRUE(node.tx_count <= 1 + AXES + 1);
@@ -2146,7 +2146,7 @@ static void test_request_home_finds_the_zero_of_all_and_returns_without_a_jump(v
         await(DRIVE_ENABLED, 5000);
         for (unsigned k = 0; k < AXES; k++) {
             TEST_ASSERT_TRUE(feedback[k].is_homed);
-            TEST_ASSERT_EQUAL_INT32(k == absolute ? 100000 + 1000 * (int32_t)k : 500, canopen_twin_position(&twin, k));
+            TEST_ASSERT_EQUAL_INT32(k == absolute ? 100000 + 1000 * (int32_t)k : 500, canopen_drives_position(&twin, k));
             TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
             TEST_ASSERT_EQUAL_INT8(8, twin.drive[k].node.drive.mode);
         }
@@ -2173,12 +2173,12 @@ static void test_request_home_again_is_not_over_before_it_begins(void)
     await(DRIVE_ENABLED, 5000);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     await(DRIVE_DISABLED, 200);
-    canopen_twin_place(&twin, 0, 7000);
+    canopen_drives_place(&twin, 0, 7000);
     cycles(2 * PERIOD);
     enable();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
     await(DRIVE_ENABLED, 5000);
-    TEST_ASSERT_EQUAL_INT32(500, canopen_twin_position(&twin, 0));
+    TEST_ASSERT_EQUAL_INT32(500, canopen_drives_position(&twin, 0));
 }
 
 /* "Done" that never was "not done" may be that of the last homing: it is believed after a while. */
@@ -2212,7 +2212,7 @@ static void test_power_lost_means_that_the_zero_is_lost(void)
 {
     home(false);
     await(DRIVE_ENABLED, 5000);
-    canopen_twin_power(&twin, 1, true);
+    canopen_drives_power(&twin, 1, true);
     (void)cycles_until(1, DRIVE_OFFLINE, 100);
     TEST_ASSERT_FALSE(feedback[1].is_homed);
     TEST_ASSERT_TRUE(feedback[0].is_homed);
@@ -2233,16 +2233,16 @@ static void test_any_trouble_at_any_time_moves_nothing(void)
         cycles((unsigned)rand() % 120);
         switch (rand() % 5) {
         case 0:
-            canopen_twin_fault(&twin, axis, 0x5000);
+            canopen_drives_fault(&twin, axis, 0x5000);
             break;
         case 1:
-            canopen_twin_power(&twin, axis, true);
+            canopen_drives_power(&twin, axis, true);
             break;
         case 2:
             twin.drive[axis].node.is_mute = true;
             break;
         case 3:
-            canopen_twin_drop(&twin, axis);
+            canopen_drives_drop(&twin, axis);
             break;
         default:
             twin.drive[axis].node.nmt = 0x04;
@@ -2260,7 +2260,7 @@ static void test_any_trouble_at_any_time_moves_nothing(void)
         }
         for (unsigned k = 0; k < AXES; k++) {
             TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
-            TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, canopen_twin_position(&twin, k));
+            TEST_ASSERT_EQUAL_INT32(100000 + 1000 * (int32_t)k, canopen_drives_position(&twin, k));
         }
     }
 }
@@ -2558,12 +2558,12 @@ static void test_emergency_is_kept_over_a_loss_and_over_with_a_boot(void)
 {
     come_up();
     tell_error(2, 0x3220);
-    canopen_twin_power(&twin, 2, false);
+    canopen_drives_power(&twin, 2, false);
     (void)cycles_until(2, DRIVE_OFFLINE, 100);
     cycles(1000);
     TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
     TEST_ASSERT_FALSE(report(2).emergency.is_over);
-    canopen_twin_power(&twin, 2, true);
+    canopen_drives_power(&twin, 2, true);
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
     TEST_ASSERT_TRUE(report(2).emergency.is_over);
@@ -2603,8 +2603,8 @@ static void test_rare_answers_carry_a_motion(void)
 {
     config.answer_every = 4;
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(4, canopen_twin_object(&twin, 3, 0x1800, 2)->value);
-    TEST_ASSERT_EQUAL_UINT32(0, canopen_twin_object(&twin, 3, 0x1800, 6)->value);
+    TEST_ASSERT_EQUAL_UINT32(4, canopen_drives_object(&twin, 3, 0x1800, 2)->value);
+    TEST_ASSERT_EQUAL_UINT32(0, canopen_drives_object(&twin, 3, 0x1800, 6)->value);
     enable();
     for (unsigned i = 0; i < 100; i++) {
         for (unsigned k = 0; k < AXES; k++) {
@@ -2614,7 +2614,7 @@ static void test_rare_answers_carry_a_motion(void)
         TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
         TEST_ASSERT_TRUE(now_us - feedback[3].actual_us <= 5 * PERIOD * CYCLE_US);
     }
-    TEST_ASSERT_INT_WITHIN(2000, 128000, canopen_twin_position(&twin, 3));
+    TEST_ASSERT_INT_WITHIN(2000, 128000, canopen_drives_position(&twin, 3));
     TEST_ASSERT_TRUE(twin.drive[3].largest_step <= 250);
 }
 
@@ -2657,7 +2657,7 @@ static void test_rare_answers_take_turns(void)
     come_up();
     enable();
     for (unsigned k = 0; k < AXES; k++) {
-        TEST_ASSERT_EQUAL_UINT32(k % 4 + 1, canopen_twin_object(&twin, k, 0x1800, 6)->value);
+        TEST_ASSERT_EQUAL_UINT32(k % 4 + 1, canopen_drives_object(&twin, k, 0x1800, 6)->value);
     }
     for (unsigned i = 0; i < 40 * PERIOD; i++) {
         uint64_t before_us[AXES];
@@ -2678,12 +2678,12 @@ static void test_rare_answers_need_1800_06_for_their_turns_only(void)
 {
     config.answer_every = 4;
     config.sync_counter = 9; /* no whole turns */
-    canopen_twin_object(&twin, 3, 0x1800, 6)->is_missing = true;
+    canopen_drives_object(&twin, 3, 0x1800, 6)->is_missing = true;
     come_up();
     setUp();
     config.answer_every = 4;
     config.sync_counter = 8;
-    canopen_twin_object(&twin, 3, 0x1800, 6)->is_missing = true;
+    canopen_drives_object(&twin, 3, 0x1800, 6)->is_missing = true;
     TEST_ASSERT_EQUAL_HEX32(0x180006, refusal_of(3).object);
 }
 
@@ -2709,9 +2709,9 @@ static void tell(uint8_t values, uint8_t every)
     config.telemetry_every = every;
     config.axis[1].scale.num = -1000;
     for (unsigned k = 0; k < AXES; k++) {
-        canopen_twin_force(&twin, k, 0x6077, 0, (uint16_t)(250 - 100 * (int)k));
-        canopen_twin_force(&twin, k, 0x60F4, 0, 1500);
-        canopen_twin_force(&twin, k, 0x60FD, 0, 0x80010005);
+        canopen_drives_force(&twin, k, 0x6077, 0, (uint16_t)(250 - 100 * (int)k));
+        canopen_drives_force(&twin, k, 0x60F4, 0, 1500);
+        canopen_drives_force(&twin, k, 0x60FD, 0, 0x80010005);
     }
 }
 
@@ -2720,12 +2720,12 @@ static void test_telemetry_of_all_kinds_takes_two_pdos(void)
     tell(DRIVE_HAS_TORQUE | DRIVE_HAS_LAG | DRIVE_HAS_INPUTS, 1);
     come_up();
     cycles(3 * PERIOD);
-    TEST_ASSERT_EQUAL_HEX32(0x40000284, canopen_twin_object(&twin, 3, 0x1801, 1)->value);
-    TEST_ASSERT_EQUAL_UINT32(2, canopen_twin_object(&twin, 3, 0x1A01, 0)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60770010, canopen_twin_object(&twin, 3, 0x1A01, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60F40020, canopen_twin_object(&twin, 3, 0x1A01, 2)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x40000384, canopen_twin_object(&twin, 3, 0x1802, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, canopen_twin_object(&twin, 3, 0x1A02, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x40000284, canopen_drives_object(&twin, 3, 0x1801, 1)->value);
+    TEST_ASSERT_EQUAL_UINT32(2, canopen_drives_object(&twin, 3, 0x1A01, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60770010, canopen_drives_object(&twin, 3, 0x1A01, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60F40020, canopen_drives_object(&twin, 3, 0x1A01, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x40000384, canopen_drives_object(&twin, 3, 0x1802, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, canopen_drives_object(&twin, 3, 0x1A02, 1)->value);
     const drive_telemetry_t plain = report(6).telemetry;
     TEST_ASSERT_EQUAL_UINT8(7, plain.has);
     TEST_ASSERT_EQUAL_INT32(-350, plain.torque_permille);
@@ -2741,9 +2741,9 @@ static void test_telemetry_of_one_kind_comes_at_its_rate(void)
 {
     tell(DRIVE_HAS_INPUTS, 5);
     come_up();
-    TEST_ASSERT_EQUAL_UINT32(5, canopen_twin_object(&twin, 2, 0x1801, 2)->value);
-    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, canopen_twin_object(&twin, 2, 0x1A01, 1)->value);
-    TEST_ASSERT_EQUAL_HEX32(0xC0000383, canopen_twin_object(&twin, 2, 0x1802, 1)->value);
+    TEST_ASSERT_EQUAL_UINT32(5, canopen_drives_object(&twin, 2, 0x1801, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, canopen_drives_object(&twin, 2, 0x1A01, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0xC0000383, canopen_drives_object(&twin, 2, 0x1802, 1)->value);
     cycles(6 * PERIOD);
     const uint64_t first_us = report(2).telemetry.at_us;
     cycles(5 * PERIOD);
@@ -2755,7 +2755,7 @@ static void test_telemetry_of_one_kind_comes_at_its_rate(void)
 static void test_telemetry_that_a_drive_cannot_map_is_named(void)
 {
     tell(DRIVE_HAS_TORQUE, 1);
-    canopen_twin_object(&twin, 4, 0x1A01, 1)->refusal = 0x06040041;
+    canopen_drives_object(&twin, 4, 0x1A01, 1)->refusal = 0x06040041;
     const drive_report_t r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, r.code);
     TEST_ASSERT_EQUAL_HEX32(0x1A0101, r.object);
@@ -2769,7 +2769,7 @@ static void test_telemetry_that_was_not_asked_for_counts_for_nothing(void)
     TEST_ASSERT_EQUAL_UINT32(3 + 9 * AXES,
                              cia402_filters(&config, filter)); /* a master's, its RPDO of ours, and those of the nodes */
     come_up();
-    TEST_ASSERT_EQUAL_HEX32(0xC0000283, canopen_twin_object(&twin, 2, 0x1801, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0xC0000283, canopen_drives_object(&twin, 2, 0x1801, 1)->value);
     TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&twin.node), &frame));
     cycles(2);
     TEST_ASSERT_EQUAL_UINT8(0, report(2).telemetry.has);
@@ -2860,7 +2860,7 @@ static void test_twice_single_repeated_or_late_answers_are_none(void)
     come_up();
     enable();
     for (unsigned i = 0; i < 10; i++) {
-        const uint32_t position = (uint32_t)canopen_twin_position(&twin, 2);
+        const uint32_t position = (uint32_t)canopen_drives_position(&twin, 2);
         const can_frame_t frame = {.id = 0x183,
                                    .length = 7,
                                    .data = {0x37, 0x12, (uint8_t)position, (uint8_t)(position >> 8), (uint8_t)(position >> 16),

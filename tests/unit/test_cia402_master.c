@@ -7,10 +7,10 @@
 
 #include <string.h>
 
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "unity.h"
 
-#define AXES      CANOPEN_TWIN_DRIVES
+#define AXES      CANOPEN_DRIVES
 #define CYCLE_US  1000u
 #define PERIOD    4u
 #define LISTEN_MS 100u
@@ -20,7 +20,7 @@ static sim_can_bus_t bus;
 static sim_can_t node;
 static sim_can_t other; /* the other master's */
 static sim_can_t spy;   /* hears all */
-static canopen_twin_t twin;
+static canopen_drives_t twin;
 static cia402_config_t config;
 static cia402_t driver;
 static drives_t hal;
@@ -32,7 +32,7 @@ static void cycles(unsigned count)
 {
     while (count-- > 0) {
         now_us += CYCLE_US;
-        canopen_twin_step(&twin, now_us);
+        canopen_drives_step(&twin, now_us);
         (void)!drives_poll(hal, now_us, feedback);
         for (unsigned k = 0; k < AXES; k++) {
             setpoint_q32[k] = feedback[k].state == DRIVE_ENABLED ? setpoint_q32[k] : feedback[k].actual_mm_q32;
@@ -77,7 +77,7 @@ void setUp(void)
     now_us = 5000000;
     memset(feedback, 0, sizeof feedback);
     sim_can_bus_init(&bus, 0, NULL, 0);
-    canopen_twin_open(&twin, &bus);
+    canopen_drives_open(&twin, &bus);
     config = (cia402_config_t){.axes = AXES,
                                .master_node = 127,
                                .mode = CIA402_MODE_CSP,
@@ -236,7 +236,7 @@ static void test_while_no_drive_is_known_it_listens_again(void)
 /* One that comes later than the others is not left out. */
 static void test_in_the_middle_of_bringing_up_nobody_is_enabled(void)
 {
-    canopen_twin_power(&twin, 4, false);
+    canopen_drives_power(&twin, 4, false);
     start();
     for (unsigned i = 0; i < 5000 && feedback[0].state != DRIVE_DISABLED; i++) {
         cycles(1);
@@ -248,7 +248,7 @@ static void test_in_the_middle_of_bringing_up_nobody_is_enabled(void)
         TEST_ASSERT_EQUAL(k == 4 ? DRIVE_OFFLINE : DRIVE_FAULT, feedback[k].state);
         TEST_ASSERT_TRUE(drive_has_other_master(&feedback[k]));
     }
-    canopen_twin_power(&twin, 4, true);
+    canopen_drives_power(&twin, 4, true);
     cycles(3000);
     TEST_ASSERT_NOT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));

@@ -6,16 +6,16 @@
 
 #include <string.h>
 
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "unity.h"
 
-#define AXES     CANOPEN_TWIN_DRIVES
+#define AXES     CANOPEN_DRIVES
 #define CYCLE_US 1000u
 #define MM(x)    ((q32_t)(x)*Q32_ONE)
 
 static sim_can_bus_t bus;
 static sim_can_t node;
-static canopen_twin_t twin;
+static canopen_drives_t twin;
 static cia402_config_t config;
 static cia402_t driver;
 static drives_t hal;
@@ -29,7 +29,7 @@ static void cycles(unsigned count)
 {
     while (count-- > 0) {
         now_us += CYCLE_US;
-        canopen_twin_step(&twin, now_us);
+        canopen_drives_step(&twin, now_us);
         (void)!drives_poll(hal, now_us, feedback);
         for (unsigned k = 0; k < AXES; k++) {
             setpoint_q32[k] = feedback[k].state == DRIVE_ENABLED ? setpoint_q32[k] : feedback[k].actual_mm_q32;
@@ -61,7 +61,7 @@ void setUp(void)
     code = 0;
     memset(feedback, 0, sizeof feedback);
     sim_can_bus_init(&bus, 0, NULL, 0);
-    canopen_twin_open(&twin, &bus);
+    canopen_drives_open(&twin, &bus);
     config = (cia402_config_t){.axes = AXES,
                                .master_node = 127,
                                .mode = CIA402_MODE_CSP,
@@ -110,7 +110,7 @@ static void test_write_is_in_the_drive(void)
     object = (drive_object_t){.index = 0x6083, .is_write = true, .size = 4, .value = {0x10, 0x20, 0x03}};
     TEST_ASSERT_EQUAL(HV_OK, drives_object_begin(hal, 2, &object));
     TEST_ASSERT_EQUAL(DRIVE_OBJECT_DONE, end());
-    TEST_ASSERT_EQUAL_HEX32(0x032010, canopen_twin_object(&twin, 2, 0x6083, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x032010, canopen_drives_object(&twin, 2, 0x6083, 0)->value);
     TEST_ASSERT_EQUAL(HV_OK, begin_read(2, 0x6083, 0));
     TEST_ASSERT_EQUAL(DRIVE_OBJECT_DONE, end());
     TEST_ASSERT_EQUAL_UINT8(4, object.size);
@@ -120,7 +120,7 @@ static void test_write_is_in_the_drive(void)
 static void test_every_drive_is_asked_by_its_number(void)
 {
     for (uint8_t k = 0; k < AXES; k++) {
-        canopen_twin_object(&twin, k, 0x6085, 0)->value = 1000u + k;
+        canopen_drives_object(&twin, k, 0x6085, 0)->value = 1000u + k;
         TEST_ASSERT_EQUAL(HV_OK, begin_read(k, 0x6085, 0));
         TEST_ASSERT_EQUAL(DRIVE_OBJECT_DONE, end());
         TEST_ASSERT_EQUAL_UINT8((1000u + k) & 0xFF, object.value[0]);
@@ -150,12 +150,12 @@ static void test_driver_takes_the_drive_when_it_needs_it(void)
 static void test_drive_that_is_lost_ends_it(void)
 {
     TEST_ASSERT_EQUAL(HV_OK, begin_read(1, 0x6085, 0));
-    canopen_twin_power(&twin, 1, false);
+    canopen_drives_power(&twin, 1, false);
     const drive_object_state_t state = end();
     TEST_ASSERT_TRUE(state == DRIVE_OBJECT_LEFT || state == DRIVE_OBJECT_SILENT);
     await(1, DRIVE_OFFLINE);
     TEST_ASSERT_EQUAL(HV_ERR_STATE, begin_read(1, 0x6085, 0));
-    canopen_twin_power(&twin, 1, true);
+    canopen_drives_power(&twin, 1, true);
     await(1, DRIVE_DISABLED); /* it is set up again */
     TEST_ASSERT_EQUAL(HV_OK, begin_read(1, 0x6085, 0));
     TEST_ASSERT_EQUAL(DRIVE_OBJECT_DONE, end());

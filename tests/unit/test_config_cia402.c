@@ -12,7 +12,7 @@
 #include "config/config.h"
 #include "platform/load.h"
 #include "config/value.h"
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 #include "inspect/report.h"
 #include "unity.h"
 
@@ -388,7 +388,7 @@ static void test_preset_of_a_drive_family_sets_its_drives_up(void)
     static const char *const k_presets[] = {"/cia402/maxon-epos4.ini", "/cia402/nanotec-c5-n5-pd4.ini"};
     static sim_can_bus_t bus;
     static sim_can_t node;
-    static canopen_twin_t twin;
+    static canopen_drives_t twin;
     static cia402_t driver;
     for (unsigned i = 0; i < 2; i++) {
         char path[300];
@@ -401,12 +401,12 @@ static void test_preset_of_a_drive_family_sets_its_drives_up(void)
         config_cia402(&m_config, &drives);
         TEST_ASSERT_TRUE(drives.axis[0].items >= 3);
         sim_can_bus_init(&bus, 0, NULL, 0);
-        canopen_twin_open(&twin, &bus);
+        canopen_drives_open(&twin, &bus);
         for (unsigned k = 0; k < drives.axes; k++) {
-            canopen_twin_object(&twin, k, 0x1018, 1)->value = canopen_twin_object(&twin, k, 0x1018, 1)->fallback = 0xFB;
+            canopen_drives_object(&twin, k, 0x1018, 1)->value = canopen_drives_object(&twin, k, 0x1018, 1)->fallback = 0xFB;
             for (unsigned at = 0; at < drives.axis[k].items; at++) {
                 const cia402_item_t *item = &drives.axis[k].item[at];
-                if (canopen_twin_object(&twin, k, item->index, item->sub) == NULL) {
+                if (canopen_drives_object(&twin, k, item->index, item->sub) == NULL) {
                     objects_add(&twin.drive[k].node.drive.od, (object_t){.index = item->index,
                                                                          .sub = item->sub,
                                                                          .bytes = item->bytes,
@@ -417,7 +417,7 @@ static void test_preset_of_a_drive_family_sets_its_drives_up(void)
         TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, filter, cia402_filters(&drives, filter)));
         TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &drives, sim_can_hal(&node)));
         for (uint64_t now_us = 5000000; now_us < 10000000; now_us += 1000) {
-            canopen_twin_step(&twin, now_us);
+            canopen_drives_step(&twin, now_us);
             (void)!drives_poll(cia402_hal(&driver), now_us, feedback);
             (void)!drives_send(cia402_hal(&driver), now_us, setpoint_q32);
         }
@@ -425,7 +425,7 @@ static void test_preset_of_a_drive_family_sets_its_drives_up(void)
             TEST_ASSERT_EQUAL_MESSAGE(DRIVE_DISABLED, feedback[k].state, k_presets[i]);
             for (unsigned at = 0; at < drives.axis[k].items; at++) {
                 const cia402_item_t *item = &drives.axis[k].item[at];
-                TEST_ASSERT_EQUAL_HEX32(item->value, canopen_twin_object(&twin, k, item->index, item->sub)->value);
+                TEST_ASSERT_EQUAL_HEX32(item->value, canopen_drives_object(&twin, k, item->index, item->sub)->value);
             }
         }
     }

@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: MIT
- * canopen_twin.h - the CANopen drives of heave-twin on a simulated CAN bus, with what tests look at, and what they spoil on the
+ * canopen_drives.h - the CANopen drives of heave-twin on a simulated CAN bus, with what tests look at, and what they spoil on the
  * way between drive and bus. Time is an argument, us.
  */
-#ifndef CANOPEN_TWIN_H
-#define CANOPEN_TWIN_H
+#ifndef CANOPEN_DRIVES_H
+#define CANOPEN_DRIVES_H
 
 #include "sim_can.h"
 #include "twin/node.h"
 
-#define CANOPEN_TWIN_DRIVES 7u
-#define CANOPEN_TWIN_LOG    400u
+#define CANOPEN_DRIVES     7u
+#define CANOPEN_DRIVES_LOG 400u
 
-struct canopen_twin;
+struct canopen_drives;
 
 /** A drive. Positions are counts. */
 typedef struct {
     node_t node; /**< of heave-twin: what it is, and most of what can be wrong with it */
-    struct canopen_twin *owner;
+    struct canopen_drives *owner;
 
     bool is_answering_late; /**< each SDO answer comes with the next request */
     bool is_restless;       /**< goes from switch on disabled to ready and back by itself while 0000h is held */
@@ -37,12 +37,12 @@ typedef struct {
     uint64_t stop_us;             /**< the last quick stop began */
     can_frame_t late;
     bool has_late;
-    uint32_t log[CANOPEN_TWIN_LOG]; /**< objects written, index << 8 | sub, in order */
+    uint32_t log[CANOPEN_DRIVES_LOG]; /**< objects written, index << 8 | sub, in order */
     uint32_t logged;
-} canopen_twin_drive_t;
+} canopen_drive_t;
 
 /** All of them on one controller. */
-typedef struct canopen_twin {
+typedef struct canopen_drives {
     sim_can_t node;
     sim_can_bus_t *bus;
     uint64_t now_us;
@@ -51,35 +51,35 @@ typedef struct canopen_twin {
     uint32_t heartbeats; /**< of the master */
     can_frame_t out[128];
     uint32_t outs;
-    canopen_twin_drive_t drive[CANOPEN_TWIN_DRIVES];
-} canopen_twin_t;
+    canopen_drive_t drive[CANOPEN_DRIVES];
+} canopen_drives_t;
 
 /** Puts them on the bus with power, nodes 1 to 7, at position 0. Beside what each drive has: 2030h:01 (16 bit), 2031h, and 2032h,
  *  which can only be read and is 3. Homing (17) finds its zero 500 counts below. */
-void canopen_twin_open(canopen_twin_t *self, sim_can_bus_t *bus);
+void canopen_drives_open(canopen_drives_t *self, sim_can_bus_t *bus);
 
 /** Lets bus and drives work up to now. */
-void canopen_twin_step(canopen_twin_t *self, uint64_t now_us);
+void canopen_drives_step(canopen_drives_t *self, uint64_t now_us);
 
 /** Switches a drive on or off; also for a dip of the supply. */
-void canopen_twin_power(canopen_twin_t *self, unsigned drive, bool is_on);
+void canopen_drives_power(canopen_drives_t *self, unsigned drive, bool is_on);
 
 /** It finds a fault. */
-void canopen_twin_fault(canopen_twin_t *self, unsigned drive, uint16_t code);
+void canopen_drives_fault(canopen_drives_t *self, unsigned drive, uint16_t code);
 
 /** Torque goes by itself, as by its enable input. */
-void canopen_twin_drop(canopen_twin_t *self, unsigned drive);
+void canopen_drives_drop(canopen_drives_t *self, unsigned drive);
 
 /** Moves what is behind it. */
-void canopen_twin_place(canopen_twin_t *self, unsigned drive, int32_t counts);
+void canopen_drives_place(canopen_drives_t *self, unsigned drive, int32_t counts);
 
 /** Where it is. */
-int32_t canopen_twin_position(const canopen_twin_t *self, unsigned drive);
+int32_t canopen_drives_position(const canopen_drives_t *self, unsigned drive);
 
 /** An object; NULL where it has none. */
-object_t *canopen_twin_object(canopen_twin_t *self, unsigned drive, uint16_t index, uint8_t sub);
+object_t *canopen_drives_object(canopen_drives_t *self, unsigned drive, uint16_t index, uint8_t sub);
 
 /** Makes an object that the drive shows hold a value. */
-void canopen_twin_force(canopen_twin_t *self, unsigned drive, uint16_t index, uint8_t sub, uint32_t value);
+void canopen_drives_force(canopen_drives_t *self, unsigned drive, uint16_t index, uint8_t sub, uint32_t value);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * canopen_twin.c - see canopen_twin.h.
+ * canopen_drives.c - see canopen_drives.h.
  */
-#include "canopen_twin.h"
+#include "canopen_drives.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -18,31 +18,31 @@ static const object_t k_own[] = {
     {.index = 0x2032, .bytes = 1, .is_read_only = true, .fallback = 3},
 };
 
-object_t *canopen_twin_object(canopen_twin_t *self, unsigned drive, uint16_t index, uint8_t sub)
+object_t *canopen_drives_object(canopen_drives_t *self, unsigned drive, uint16_t index, uint8_t sub)
 {
     return objects_find(&self->drive[drive].node.drive.od, index, sub);
 }
 
-void canopen_twin_force(canopen_twin_t *self, unsigned drive, uint16_t index, uint8_t sub, uint32_t value)
+void canopen_drives_force(canopen_drives_t *self, unsigned drive, uint16_t index, uint8_t sub, uint32_t value)
 {
-    object_t *object = canopen_twin_object(self, drive, index, sub);
+    object_t *object = canopen_drives_object(self, drive, index, sub);
     object->value = value;
     object->is_forced = true;
 }
 
 /* --- To the bus --- */
 
-static void put(canopen_twin_t *self, const can_frame_t *frame)
+static void put(canopen_drives_t *self, const can_frame_t *frame)
 {
     if (self->outs < sizeof self->out / sizeof self->out[0]) {
         self->out[self->outs++] = *frame;
     }
 }
 
-static void put_answer(canopen_twin_drive_t *drive, const can_frame_t *frame)
+static void put_answer(canopen_drive_t *drive, const can_frame_t *frame)
 {
     const can_frame_t late = drive->late;
-    if (frame->data[0] == 0x60 && drive->logged < CANOPEN_TWIN_LOG) {
+    if (frame->data[0] == 0x60 && drive->logged < CANOPEN_DRIVES_LOG) {
         drive->log[drive->logged++] = (uint32_t)frame->data[2] << 16 | (uint32_t)frame->data[1] << 8 | frame->data[3];
     }
     if (!drive->is_answering_late) {
@@ -58,7 +58,7 @@ static void put_answer(canopen_twin_drive_t *drive, const can_frame_t *frame)
 
 static void put_of_drive(void *ctx, const can_frame_t *frame)
 {
-    canopen_twin_drive_t *drive = ctx;
+    canopen_drive_t *drive = ctx;
     can_frame_t cut = *frame;
     if ((frame->id & 0x780) == 0x580) {
         put_answer(drive, frame);
@@ -68,7 +68,7 @@ static void put_of_drive(void *ctx, const can_frame_t *frame)
     put(drive->owner, &cut);
 }
 
-static void flush(canopen_twin_t *self)
+static void flush(canopen_drives_t *self)
 {
     uint32_t sent = 0;
     const hal_can_t can = sim_can_hal(&self->node);
@@ -89,13 +89,13 @@ typedef struct {
     uint8_t nmt;
 } before_t;
 
-static before_t look(const canopen_twin_drive_t *drive)
+static before_t look(const canopen_drive_t *drive)
 {
     const drive_t *model = &drive->node.drive;
     return (before_t){model->state, model->set_points, model->enabled, drive_count(model), drive->node.nmt};
 }
 
-static void note_target(canopen_twin_drive_t *drive, int32_t position)
+static void note_target(canopen_drive_t *drive, int32_t position)
 {
     const drive_t *model = &drive->node.drive;
     const bool is_ip = model->mode == 7;
@@ -108,7 +108,7 @@ static void note_target(canopen_twin_drive_t *drive, int32_t position)
     drive->setpoints++;
 }
 
-static void note(canopen_twin_drive_t *drive, const before_t *before, uint64_t now_us)
+static void note(canopen_drive_t *drive, const before_t *before, uint64_t now_us)
 {
     const drive_t *model = &drive->node.drive;
     drive->boots += before->nmt == 0 && drive->node.nmt != 0;
@@ -138,7 +138,7 @@ static void hold(drive_t *model)
 }
 
 /* Once a step. */
-static void glide(canopen_twin_drive_t *drive)
+static void glide(canopen_drive_t *drive)
 {
     drive_t *model = &drive->node.drive;
     if (drive->glide_us != 0 && model->state == TWIN_QUICK_STOP && model->stop_due_us != DRIVE_NEVER) {
@@ -148,7 +148,7 @@ static void glide(canopen_twin_drive_t *drive)
     }
 }
 
-static void fidget(canopen_twin_drive_t *drive, uint64_t now_us)
+static void fidget(canopen_drive_t *drive, uint64_t now_us)
 {
     drive_t *model = &drive->node.drive;
     const bool is_between = model->state == TWIN_DISABLED || model->state == TWIN_READY;
@@ -161,7 +161,7 @@ static void fidget(canopen_twin_drive_t *drive, uint64_t now_us)
 
 /* --- Life --- */
 
-static void let_live(canopen_twin_drive_t *drive, const can_frame_t *frame, uint64_t now_us)
+static void let_live(canopen_drive_t *drive, const can_frame_t *frame, uint64_t now_us)
 {
     const before_t before = look(drive);
     if (frame != NULL) {
@@ -176,26 +176,26 @@ static void let_live(canopen_twin_drive_t *drive, const can_frame_t *frame, uint
     note(drive, &before, now_us);
 }
 
-static void hear(canopen_twin_t *self, const can_frame_t *frame)
+static void hear(canopen_drives_t *self, const can_frame_t *frame)
 {
     const bool is_sync = frame->id == 0x80;
     self->syncs += is_sync;
     self->sync_number = is_sync ? frame->data[0] : self->sync_number;
     self->heartbeats += frame->id == MASTER_BEAT;
     const uint32_t function = frame->id & 0x780, of = frame->id & 0x7F;
-    for (unsigned k = 0; k < CANOPEN_TWIN_DRIVES; k++) {
+    for (unsigned k = 0; k < CANOPEN_DRIVES; k++) {
         if ((function != 0x200 && function != 0x600) || of == k + 1) { /* what is for one alone */
             let_live(&self->drive[k], frame, self->now_us);
         }
     }
 }
 
-void canopen_twin_step(canopen_twin_t *self, uint64_t now_us)
+void canopen_drives_step(canopen_drives_t *self, uint64_t now_us)
 {
     can_frame_t frame;
     uint64_t at_us = 0;
     self->now_us = now_us;
-    for (unsigned k = 0; k < CANOPEN_TWIN_DRIVES; k++) {
+    for (unsigned k = 0; k < CANOPEN_DRIVES; k++) {
         glide(&self->drive[k]);
     }
     bool was_heard = true;
@@ -208,7 +208,7 @@ void canopen_twin_step(canopen_twin_t *self, uint64_t now_us)
                 hear(self, &frame);
             }
         }
-        for (unsigned k = 0; k < CANOPEN_TWIN_DRIVES; k++) {
+        for (unsigned k = 0; k < CANOPEN_DRIVES; k++) {
             let_live(&self->drive[k], NULL, now_us);
         }
         flush(self);
@@ -216,39 +216,39 @@ void canopen_twin_step(canopen_twin_t *self, uint64_t now_us)
     sim_can_bus_step(self->bus, now_us);
 }
 
-void canopen_twin_power(canopen_twin_t *self, unsigned drive, bool is_on)
+void canopen_drives_power(canopen_drives_t *self, unsigned drive, bool is_on)
 {
-    canopen_twin_drive_t *d = &self->drive[drive];
+    canopen_drive_t *d = &self->drive[drive];
     const before_t before = look(d);
     node_power(&d->node, false, self->now_us);
     node_power(&d->node, is_on, self->now_us);
     note(d, &before, self->now_us);
 }
 
-void canopen_twin_fault(canopen_twin_t *self, unsigned drive, uint16_t code)
+void canopen_drives_fault(canopen_drives_t *self, unsigned drive, uint16_t code)
 {
-    canopen_twin_drive_t *d = &self->drive[drive];
+    canopen_drive_t *d = &self->drive[drive];
     const before_t before = look(d);
     drive_fault(&d->node.drive, code);
     node_advance(&d->node, self->now_us); /* which tells of it */
     note(d, &before, self->now_us);
 }
 
-void canopen_twin_drop(canopen_twin_t *self, unsigned drive)
+void canopen_drives_drop(canopen_drives_t *self, unsigned drive)
 {
-    canopen_twin_drive_t *d = &self->drive[drive];
+    canopen_drive_t *d = &self->drive[drive];
     const before_t before = look(d);
     drive_drop(&d->node.drive);
     d->resets -= before.state == TWIN_FAULT; /* nobody has taken it back */
     note(d, &before, self->now_us);
 }
 
-int32_t canopen_twin_position(const canopen_twin_t *self, unsigned drive)
+int32_t canopen_drives_position(const canopen_drives_t *self, unsigned drive)
 {
     return drive_count(&self->drive[drive].node.drive);
 }
 
-void canopen_twin_place(canopen_twin_t *self, unsigned drive, int32_t counts)
+void canopen_drives_place(canopen_drives_t *self, unsigned drive, int32_t counts)
 {
     drive_t *model = &self->drive[drive].node.drive;
     model->motor.actual = counts + model->origin;
@@ -256,15 +256,15 @@ void canopen_twin_place(canopen_twin_t *self, unsigned drive, int32_t counts)
     motor_hold(&model->motor);
 }
 
-void canopen_twin_open(canopen_twin_t *self, sim_can_bus_t *bus)
+void canopen_drives_open(canopen_drives_t *self, sim_can_bus_t *bus)
 {
     memset(self, 0, sizeof *self);
     self->bus = bus;
     if (sim_can_open(&self->node, bus, NULL, 0) != HV_OK) {
         abort();
     }
-    for (unsigned k = 0; k < CANOPEN_TWIN_DRIVES; k++) {
-        canopen_twin_drive_t *d = &self->drive[k];
+    for (unsigned k = 0; k < CANOPEN_DRIVES; k++) {
+        canopen_drive_t *d = &self->drive[k];
         node_t *node = &d->node;
         d->owner = self;
         *node = (node_t){.number = (uint8_t)(k + 1),
@@ -279,7 +279,7 @@ void canopen_twin_open(canopen_twin_t *self, sim_can_bus_t *bus)
                                    .home_method = 17,
                                    .is_absolute = true}};
         node_join(&node, 1);
-        canopen_twin_place(self, k, 0);
+        canopen_drives_place(self, k, 0);
         node_power(node, true, 0);
     }
 }
