@@ -414,8 +414,10 @@ void linux_modbus_link_run(linux_modbus_link_t *self, const modbus_request_t *re
 {
     memset(result, 0, sizeof *result);
     result->status = run(self, request, result);
-    if (result->status == HV_OK) {
-        result->count = modbus_is_write(request->function) ? 0 : request->count;
+    if (result->status == HV_OK && modbus_is_write(request->function)) {
+        memcpy(result->value, request->value, sizeof result->value);
+    } else if (result->status == HV_OK) {
+        result->count = request->count;
     } else {
         memset(result->value, 0, sizeof result->value);
     }

@@ -111,6 +111,9 @@ static modbus_result_t run(sim_modbus_t *self, const modbus_request_t *request)
     }
     modbus_result_t result = {.tag = request->tag};
     put_on_wire(self, request, &result);
+    if (result.status == HV_OK && modbus_is_write(request->function)) {
+        memcpy(result.value, request->value, sizeof result.value);
+    }
     return result;
 }
 

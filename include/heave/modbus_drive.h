@@ -195,8 +195,8 @@ typedef struct {
     q32_t paced_q32; /**< after pacing */
     int64_t sum_q32; /**< of paced_q32 since the last one written */
     uint32_t sums;
-    q32_t offered_q32;    /**< mean that was submitted last */
-    q32_t written_q32;    /**< mean that was confirmed last */
+    q32_t offered_q32;    /**< newest mean */
+    q32_t written_q32;    /**< position that was confirmed last */
     uint32_t period_us;   /**< T, smoothed */
     uint64_t setpoint_us; /**< last confirmed; 0 = none */
     uint64_t due_us;      /**< of the next set-point */

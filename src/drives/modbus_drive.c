@@ -77,7 +77,7 @@ static void receive(modbus_drive_t *self, unsigned k)
         if (axis->is_broadcast && result.tag == axis->write.tag) {
             end_broadcasts(self, self->map->axis[k].line);
         }
-        self->setpoints += modbus_drive_axis_receive_write(axis, self->map, &result, self->now_us);
+        self->setpoints += modbus_drive_axis_receive_write(axis, self->map, &self->map->axis[k], &result, self->now_us);
         self->failures += result.status != HV_OK;
     }
     if (hal_modbus_poll(line_of(self, k), read_slot(k), &result) == HV_OK) {
@@ -89,7 +89,7 @@ static void receive(modbus_drive_t *self, unsigned k)
 static void submit_write(modbus_drive_t *self, unsigned k)
 {
     modbus_request_t request;
-    if (modbus_drive_axis_next_write(&self->axis[k], self->map, self->map->axis[k].unit, self->now_us, &request)) {
+    if (modbus_drive_axis_next_write(&self->axis[k], self->map, &self->map->axis[k], self->now_us, &request)) {
         (void)!hal_modbus_submit(line_of(self, k), write_slot(k), &request);
     }
 }

@@ -183,7 +183,17 @@ static void note_setpoint(modbus_drive_axis_t *self, uint64_t now_us)
         self->period_us = (uint32_t)fx_clamp((int64_t)self->period_us + (passed_us - (int64_t)self->period_us) / 8, 1, 10000000);
     }
     self->setpoint_us = now_us;
-    self->written_q32 = self->offered_q32;
+}
+
+/* The position in a block that is in the drive now: a newer one may have been submitted since. */
+static void note_position(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
+                          const modbus_result_t *result)
+{
+    unsigned block = 0;
+    const modbus_drive_field_t *position = modbus_drive_find(&map->setpoint, MODBUS_DRIVE_POSITION, &block);
+    if (position != NULL && block == self->step) {
+        modbus_drive_axis_confirm(self, map, axis, modbus_drive_extract(position, result->value));
+    }
 }
 
 /* A whole set-point is in the drive. */
@@ -215,9 +225,13 @@ static uint16_t address_of(const modbus_drive_axis_t *self, const modbus_drive_m
     return modbus_drive_phase_blocks_of(self, map)->block[self->step].address;
 }
 
-static bool receive_block(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+static bool receive_block(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
+                          const modbus_result_t *result, uint64_t now_us)
 {
     const bool is_setpoint = self->job == MODBUS_DRIVE_JOB_SETPOINT && self->phase == MODBUS_DRIVE_ENABLED;
+    if (is_setpoint) {
+        note_position(self, map, axis, result);
+    }
     self->step++;
     if (self->step < modbus_drive_phase_blocks_of(self, map)->count) {
         modbus_drive_phase_forget(&self->write);
@@ -240,8 +254,8 @@ void modbus_drive_axis_end_broadcast(modbus_drive_axis_t *self)
 }
 
 /* During start-up a drive that will not have a value is a case of its own: it is there, and not as it has to be. */
-bool modbus_drive_axis_receive_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result,
-                                     uint64_t now_us)
+bool modbus_drive_axis_receive_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map,
+                                     const modbus_drive_axis_map_t *axis, const modbus_result_t *result, uint64_t now_us)
 {
     if (!is_current(&self->write, result)) { /* nor is one where there is no job: its start has forgotten them all */
         return false;
@@ -260,5 +274,5 @@ bool modbus_drive_axis_receive_write(modbus_drive_axis_t *self, const modbus_dri
         receive_item(self, map, result, now_us);
         return false;
     }
-    return receive_block(self, map, now_us);
+    return receive_block(self, map, axis, result, now_us);
 }

@@ -141,20 +141,27 @@ static bool next_block(modbus_drive_axis_t *self, const modbus_drive_map_t *map,
     return true;
 }
 
+static bool is_next_setpoint(const modbus_drive_axis_t *self)
+{
+    return self->job == MODBUS_DRIVE_JOB_SETPOINT && self->phase == MODBUS_DRIVE_ENABLED && self->step == 0;
+}
+
 /* A set-point that still waits is replaced by the newest one, once the next one is due anyway. */
 static bool is_due(const modbus_drive_axis_t *self, uint64_t now_us)
 {
-    const bool is_stream = self->job == MODBUS_DRIVE_JOB_SETPOINT && self->phase == MODBUS_DRIVE_ENABLED && self->step == 0;
-    return is_stream ? self->is_fresh && now_us >= self->due_us : !self->write.is_out;
+    return is_next_setpoint(self) ? self->is_fresh && now_us >= self->due_us : !self->write.is_out;
 }
 
-bool modbus_drive_axis_next_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint8_t unit, uint64_t now_us,
-                                  modbus_request_t *out)
+bool modbus_drive_axis_next_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
+                                  uint64_t now_us, modbus_request_t *out)
 {
     if (self->job == MODBUS_DRIVE_NO_JOB || !is_due(self, now_us)) {
         return false;
     }
-    *out = (modbus_request_t){.unit = self->is_broadcast ? HAL_MODBUS_BROADCAST : unit};
+    if (is_next_setpoint(self)) {
+        modbus_drive_axis_choose_speed(self, map, axis);
+    }
+    *out = (modbus_request_t){.unit = self->is_broadcast ? HAL_MODBUS_BROADCAST : axis->unit};
     if (self->job == MODBUS_DRIVE_JOB_STARTUP) {
         next_item(self, map, out);
     } else if (!next_block(self, map, now_us, out)) {

@@ -18,8 +18,8 @@ void modbus_drive_axis_init(modbus_drive_axis_t *self, const modbus_drive_map_t 
  *  @return true where a set-point was confirmed by it */
 void modbus_drive_axis_receive_read(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale,
                                     const modbus_result_t *result, uint64_t now_us);
-bool modbus_drive_axis_receive_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result,
-                                     uint64_t now_us);
+bool modbus_drive_axis_receive_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map,
+                                     const modbus_drive_axis_map_t *axis, const modbus_result_t *result, uint64_t now_us);
 
 /** A stop has gone to all drives of its line: now to itself. */
 void modbus_drive_axis_end_broadcast(modbus_drive_axis_t *self);
@@ -31,8 +31,8 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
  *  @return false where nothing is */
 bool modbus_drive_axis_next_read(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint8_t unit, uint64_t now_us,
                                  modbus_request_t *out);
-bool modbus_drive_axis_next_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint8_t unit, uint64_t now_us,
-                                  modbus_request_t *out);
+bool modbus_drive_axis_next_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
+                                  uint64_t now_us, modbus_request_t *out);
 
 /** Carries out a request that is allowed. */
 void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map_t *map, drives_request_t request,
@@ -44,6 +44,14 @@ void modbus_drive_axis_begin(modbus_drive_axis_t *self, const counts_scale_t *sc
 /** A set-point, as the line can carry it: what is written next is the mean since the last one written. */
 void modbus_drive_axis_offer(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
                              uint64_t now_us);
+
+/** The speed field of the position that is written next. */
+void modbus_drive_axis_choose_speed(modbus_drive_axis_t *self, const modbus_drive_map_t *map,
+                                    const modbus_drive_axis_map_t *axis);
+
+/** A position is in the drive. */
+void modbus_drive_axis_confirm(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
+                               int64_t counts);
 
 /** Stops following where a set-point is too far away. */
 void modbus_drive_axis_watch(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,

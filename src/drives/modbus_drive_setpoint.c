@@ -77,12 +77,29 @@ void modbus_drive_axis_offer(modbus_drive_axis_t *self, const modbus_drive_map_t
         return; /* a set-point of several blocks goes out whole */
     }
     self->offered_q32 = mean_of(self->sum_q32, self->sums);
-    self->target_speed = speed_of(self, map, axis, fx_sub_sat(self->offered_q32, self->written_q32));
     self->is_fresh = true;
     if (counts_from_units(&axis->scale, self->offered_q32, &self->target_counts) != HV_OK) {
         const guard_limits_t limits = limits_of(self, axis);
         fail_of_guard(self, map, guard_out_of_counts(self->offered_q32, &limits), now_us);
     }
+}
+
+void modbus_drive_axis_choose_speed(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis)
+{
+    self->target_speed = speed_of(self, map, axis, fx_sub_sat(self->offered_q32, self->written_q32));
+}
+
+void modbus_drive_axis_confirm(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
+                               int64_t counts)
+{
+    q32_t at_q32 = self->written_q32;
+    (void)!counts_to_units(&axis->scale, counts, &at_q32); /* which it was made from */
+    if (self->step + 1u < map->setpoint.count) {           /* the other blocks are those of this position */
+        self->target_counts = counts;
+        self->target_speed = speed_of(self, map, axis, fx_sub_sat(at_q32, self->written_q32));
+        self->is_fresh = false;
+    }
+    self->written_q32 = at_q32;
 }
 
 void modbus_drive_axis_watch(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,

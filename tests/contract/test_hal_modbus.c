@@ -278,6 +278,7 @@ static void test_write_every_function_reaches_that_device_only(void)
         TEST_ASSERT_EQUAL_UINT8(0, result.count);
         for (uint8_t i = 0; i < request.count; i++) {
             TEST_ASSERT_EQUAL_HEX16(request.value[i], fixture->get(1, k_rows[row].bank, 30 + i));
+            TEST_ASSERT_EQUAL_HEX16(request.value[i], result.value[i]);
             TEST_ASSERT_EQUAL_HEX16(0, fixture->get(7, k_rows[row].bank, 30 + i));
         }
         TEST_ASSERT_EQUAL_HEX16(0, fixture->get(1, k_rows[row].bank, 29));

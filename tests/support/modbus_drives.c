@@ -10,7 +10,6 @@
 #include "modbus_maps.h"
 
 #define SPEED     60000.0 /* counts/s */
-#define QUICK     1e9     /* of a drive to its target: the speed that it is asked for is seen, and is no limit */
 #define HOMING_US 30000.0
 
 void modbus_drives_command(modbus_drives_t *self, unsigned k, modbus_drive_command_t command)
@@ -38,7 +37,6 @@ static int write_target(modbus_drives_t *self, unsigned k, const modbus_request_
     const int exception = register_drive_write(twin, request->address, value, request->count, self->now_us);
     if (twin->state == REGISTER_TORQUE && !asked->is_homed_since) {
         asked->largest_step = (int32_t)fx_clamp(llabs(asked->target - from), asked->largest_step, INT32_MAX);
-        motor_travel(twin->motor, twin->motor->goal, QUICK);
     }
     return exception;
 }

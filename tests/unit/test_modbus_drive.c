@@ -880,6 +880,31 @@ static void test_speed_register_fits_the_period_of_the_line(void)
     TEST_ASSERT_EQUAL_UINT16(0, slave.asked[0].speed);
 }
 
+/* 50 mm/s is 500 counts: a drive that obeys its speed arrives, whatever the line. */
+static void test_speed_register_lets_the_drive_arrive(void)
+{
+    static const struct {
+        bool is_shared;
+        uint32_t transaction_us;
+    } k_lines[] = {{false, 300}, {false, 1100}, {false, 2500}, {true, 300}, {true, 900}, {true, 2000}};
+    for (size_t i = 0; i < sizeof k_lines / sizeof k_lines[0]; i++) {
+        map = modbus_maps_wide(k_lines[i].is_shared);
+        map.expected_us = 14 * k_lines[i].transaction_us;
+        map.feedback_timeout_us = 300000;
+        open_slaves(false, k_lines[i].is_shared, k_lines[i].transaction_us);
+        enable();
+        move(MM(1) / 20, 0, 600);
+        uint16_t low = UINT16_MAX, high = 0;
+        for (unsigned n = 0; n < 400; n++) {
+            move(MM(1) / 20, 0, 1);
+            low = slave.asked[3].speed < low ? slave.asked[3].speed : low;
+            high = slave.asked[3].speed > high ? slave.asked[3].speed : high;
+        }
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT16(500, low);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(850, high); /* the way of three cycles, in the time of two */
+    }
+}
+
 /* 50 mm/s again, but a drive that takes more than 40 mm/s for an alarm. */
 static void test_speed_register_keeps_below_its_limit(void)
 {
@@ -1606,6 +1631,7 @@ int main(void)
     RUN_TEST(test_slow_line_paces_all_axes_alike);
     RUN_TEST(test_pace_unlimited_where_carry_is_none);
     RUN_TEST(test_speed_register_fits_the_period_of_the_line);
+    RUN_TEST(test_speed_register_lets_the_drive_arrive);
     RUN_TEST(test_speed_register_keeps_below_its_limit);
     RUN_TEST(test_smoothing_takes_out_what_the_line_cannot_carry);
     RUN_TEST(test_blocks_of_a_setpoint_go_out_whole);

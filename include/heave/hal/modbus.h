@@ -65,7 +65,7 @@ typedef struct {
     uint8_t count;                         /**< values read, 0 for writes and errors */
     uint32_t tag;                          /**< of the request */
     uint64_t done_us;                      /**< when it ended, on the time line of hal_clock_now_us() */
-    uint16_t value[HAL_MODBUS_VALUES_MAX]; /**< reads: registers, or coils as 0 / 1 */
+    uint16_t value[HAL_MODBUS_VALUES_MAX]; /**< registers, or coils as 0 / 1: what was read, or what was written, with HV_OK */
 } modbus_result_t;
 
 /** Every op is mandatory. */
