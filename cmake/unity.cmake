@@ -52,6 +52,7 @@ endfunction()
 function(heave_unit_test name)
   add_executable(test_${name} test_${name}.c ${PROJECT_SOURCE_DIR}/tests/support/unity_assert.c ${ARGN})
   target_link_libraries(test_${name} PRIVATE heave_core unity m)
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support)
   target_compile_definitions(test_${name} PRIVATE HEAVE_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
   # on the file, because a target's own options stand before those of heave_options and would lose
   set_source_files_properties(test_${name}.c PROPERTIES COMPILE_OPTIONS "-Wno-conversion;-Wno-sign-conversion")

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "random.h"
 #include "rig.h"
 
 #define CYCLES_DEFAULT 100000
@@ -23,26 +24,12 @@
 #define PERIODS_60_HZ  16667u /* us */
 
 static rig_t m_rig;
-static uint64_t m_random;
 static long m_cycles, m_proved;
 static q32_t m_rest_q32[DRIVES_MAX];
 static bool m_is_watching;
 static long m_moved;
 static uint64_t m_moved_us;
 static unsigned m_case;
-
-static uint64_t random_bits(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return m_random;
-}
-
-static unsigned below(unsigned limit)
-{
-    return (unsigned)(random_bits() >> 16) % limit;
-}
 
 static double around(double range)
 {
@@ -81,7 +68,7 @@ static void make_frame(ride_t *ride, double size, unsigned time_ms)
         const double value = is_angle         ? around(90)
                              : !ride->is_pose ? 100 + around(15 * size)
                                               : around((is_rotation ? 3 : 15) * size);
-        const int printed = snprintf(ride->text + used, sizeof ride->text - (size_t)used, "%.*f,", (int)below(7), value);
+        const int printed = snprintf(ride->text + used, sizeof ride->text - (size_t)used, "%.*f,", (int)random_below(7), value);
         ride->target[i] = strtod(ride->text + used, NULL);
         used += printed;
     }
@@ -92,12 +79,12 @@ static void make_frame(ride_t *ride, double size, unsigned time_ms)
 static void make_ride(ride_t *ride)
 {
     static const unsigned k_gaps_ms[] = {4, 16, 16, 33, 100, 400};
-    const unsigned parts = 1 + below(4);
+    const unsigned parts = 1 + random_below(4);
     for (unsigned part = 0; part < parts; part++) {
-        const unsigned gap_ms = k_gaps_ms[below(6)], frames = 2 + below(100);
-        const unsigned time_ms = below(3) == 0 ? 1 + below(2 * gap_ms) : 0;
-        const double size = (1 + below(10)) / 10.0;
-        ride->is_pose = below(3) != 0;
+        const unsigned gap_ms = k_gaps_ms[random_below(6)], frames = 2 + random_below(100);
+        const unsigned time_ms = random_below(3) == 0 ? 1 + random_below(2 * gap_ms) : 0;
+        const double size = (1 + random_below(10)) / 10.0;
+        ride->is_pose = random_below(3) != 0;
         for (unsigned i = 0; i < frames; i++) {
             make_frame(ride, size, time_ms);
             rig_send(&m_rig, ride->text);
@@ -119,7 +106,7 @@ static void run(const ride_t *ride, long cycles)
     while (m_rig.now_us < end_us) {
         rig_send(&m_rig, ride->text);
         sent_us += PERIODS_60_HZ;
-        const uint64_t next_us = sent_us + below(5000); /* jitter */
+        const uint64_t next_us = sent_us + random_below(5000); /* jitter */
         const uint64_t until_us = next_us < end_us ? next_us : end_us;
         rig_run_ms(&m_rig, until_us > m_rig.now_us ? (unsigned)((until_us - m_rig.now_us + 999) / 1000) : 1);
     }
@@ -308,7 +295,7 @@ int main(int count, char **arguments)
     const long cycles = count > 2 ? strtol(arguments[2], NULL, 0) : CYCLES_DEFAULT;
     const long rides = count > 3 ? strtol(arguments[3], NULL, 0) : RIDES_DEFAULT;
     printf("TAP version 13\n1..%ld\n# seed %llu; again: drift SEED CYCLES RIDES\n", 6 * rides, (unsigned long long)seed);
-    m_random = seed * 0x9E3779B97F4A7C15u + 1;
+    random_begin(seed * 0x9E3779B97F4A7C15u + 1);
     bool is_ok = try_platform("hexapod", rig_hexapod(), cycles, rides);
     is_ok &= try_platform("tripod", rig_tripod(), cycles, rides);
     printf("# figure %ld cycles at rest, set-points compared bit by bit\n# figure %ld of state compared\n", m_cycles, m_proved);

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "random.h"
 #include "rig.h"
 #include "supervision.h"
 
@@ -18,26 +19,12 @@
 
 static rig_t m_rig;
 static supervision_t m_supervision;
-static uint64_t m_random;
 static unsigned m_cylinders;
 static long m_judged, m_faults, m_cycles, m_together, m_estops, m_silences, m_owners;
 
-static uint64_t random_bits(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return m_random;
-}
-
-static unsigned below(unsigned limit)
-{
-    return (unsigned)(random_bits() >> 16) % limit;
-}
-
 static bool one_in(unsigned chances)
 {
-    return below(chances) == 0;
+    return random_below(chances) == 0;
 }
 
 static double around(double range)
@@ -75,7 +62,7 @@ static void change_mood(void)
 {
     static const unsigned k_gaps_ms[] = {0, 0, 1, 2, 3, 5, 10, 16, 20, 33, 40, 100, 250};
     static const double k_sizes[] = {0.01, 0.1, 0.3, 0.6, 1, 1.2, 50, 30000};
-    m_mood = (mood_t){.size = k_sizes[below(8)], .gap_ms = k_gaps_ms[below(13)], .command = below(8)};
+    m_mood = (mood_t){.size = k_sizes[random_below(8)], .gap_ms = k_gaps_ms[random_below(13)], .command = random_below(8)};
 }
 
 /* A value: noise, or something smooth that a stream may be. */
@@ -96,7 +83,7 @@ static int put_values(char *text, size_t size, bool is_pose, unsigned count)
         const bool is_rotation = count <= 4 ? i < 2 : i < 3;
         const double range = is_angle ? 720 : !is_pose ? 100 : is_rotation ? 25 : 120;
         const double middle = is_pose || is_angle ? 0 : 100;
-        used += snprintf(text + used, size - (size_t)used, "%.*f,", (int)below(7), middle + value_of(i, range));
+        used += snprintf(text + used, size - (size_t)used, "%.*f,", (int)random_below(7), middle + value_of(i, range));
     }
     return used;
 }
@@ -109,17 +96,17 @@ static void send_frame(void)
         unsigned count;
     } k_commands[] = {{"A6", true, 6}, {"A6", true, 6},  {"C6", false, 6}, {"A3", true, 3},
                       {"A7", true, 7}, {"C7", false, 7}, {"C3", false, 3}, {"A4", true, 4}};
-    const unsigned command = m_mood.command != 0 ? m_mood.command : below(8);
+    const unsigned command = m_mood.command != 0 ? m_mood.command : random_below(8);
     const bool is_timed = one_in(3);
     char text[400];
     int used = snprintf(text, sizeof text, "@%s%s:", k_commands[command].name, is_timed ? "T" : "");
     used += put_values(text + used, sizeof text - (size_t)used, k_commands[command].is_pose, k_commands[command].count);
     if (is_timed) {
-        const unsigned ms = one_in(3) ? below(3000) : m_mood.gap_ms != 0 ? m_mood.gap_ms : below(60);
+        const unsigned ms = one_in(3) ? random_below(3000) : m_mood.gap_ms != 0 ? m_mood.gap_ms : random_below(60);
         (void)snprintf(text + used, sizeof text - (size_t)used, "%u#", ms);
         send_text(text, ms == 0 ? 1 : ms);
     } else {
-        (void)snprintf(text + used, sizeof text - (size_t)used, "%X#", below(0x10000));
+        (void)snprintf(text + used, sizeof text - (size_t)used, "%X#", random_below(0x10000));
         send_text(text, 0);
     }
 }
@@ -143,13 +130,13 @@ static void send_garbage(void)
         return;
     }
     if (one_in(2)) {
-        send_text(k_garbage[below(sizeof k_garbage / sizeof k_garbage[0])], 0);
+        send_text(k_garbage[random_below(sizeof k_garbage / sizeof k_garbage[0])], 0);
         return;
     }
     uint8_t bytes[600];
-    const size_t length = below(sizeof bytes);
+    const size_t length = random_below(sizeof bytes);
     for (size_t i = 0; i < length; i++) {
-        bytes[i] = one_in(3) ? (uint8_t) "@A6CT:,0.5-#"[below(12)] : (uint8_t)random_bits();
+        bytes[i] = one_in(3) ? (uint8_t) "@A6CT:,0.5-#"[random_below(12)] : (uint8_t)random_bits();
     }
     send_bytes(bytes, length, 60000); /* it may happen to be anything */
 }
@@ -158,8 +145,8 @@ static void send_garbage(void)
 
 static void trouble(void)
 {
-    const uint8_t axis = (uint8_t)below(m_rig.drives.count);
-    switch (below(6)) {
+    const uint8_t axis = (uint8_t)random_below(m_rig.drives.count);
+    switch (random_below(6)) {
     case 0:
         sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
         break;
@@ -197,15 +184,15 @@ static void operate(void)
 {
     static const event_t k_requests[] = {EVENT_ENGAGE, EVENT_ENGAGE, EVENT_ENGAGE, EVENT_HOLD,
                                          EVENT_RESUME, EVENT_RESUME, EVENT_PARK,   EVENT_RESET};
-    ask(k_requests[below(8)]);
+    ask(k_requests[random_below(8)]);
 }
 
 static unsigned gap_ms(void)
 {
     if (m_mood.gap_ms != 0) {
-        return m_mood.gap_ms + (one_in(4) ? below(3) : 0);
+        return m_mood.gap_ms + (one_in(4) ? random_below(3) : 0);
     }
-    return one_in(5) ? below(400) : below(25);
+    return one_in(5) ? random_below(400) : random_below(25);
 }
 
 /* ---- judgement ---- */
@@ -262,7 +249,7 @@ static void traffic(void)
         m_host = 1 - m_host;
     }
     if (one_in(200)) { /* nobody sends */
-        rig_run_ms(&m_rig, below(10000));
+        rig_run_ms(&m_rig, random_below(10000));
     }
     if (one_in(12)) {
         send_garbage();
@@ -279,7 +266,7 @@ static void events(void)
     }
     if (one_in(100)) {
         trouble();
-        rig_run_ms(&m_rig, one_in(3) ? 1 : 5 + below(one_in(2) ? 20 : 2000));
+        rig_run_ms(&m_rig, one_in(3) ? 1 : 5 + random_below(one_in(2) ? 20 : 2000));
         mend();
     }
 }
@@ -309,14 +296,14 @@ static bool storm(settings_t settings, long cycles)
     settings.silence_settle_ms = 8000;
     settings.takeover_ms = 2500;
     settings.relay_safe_mask = 0x805;
-    settings.relay_safe_after_ms = below(3) * 700;
+    settings.relay_safe_after_ms = random_below(3) * 700;
     settings.axis[AXIS_ANGLE].wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
     for (unsigned i = AXIS_ROLL; i <= AXIS_YAW; i++) {
         settings.axis[i].wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
     }
     m_cylinders = settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     rig_start(&m_rig, &settings, false);
-    m_rig.now_us = one_in(3) ? 0 : random_bits() >> (2 + below(40)); /* up for years, or for longer than anything lasts */
+    m_rig.now_us = one_in(3) ? 0 : random_bits() >> (2 + random_below(40)); /* up for years, or for longer than anything lasts */
     m_rig.is_auto_checking = true;
     supervision_init(&m_supervision, &m_rig);
     m_rig.after_cycle = judge_cycle;
@@ -363,7 +350,7 @@ int main(int count, char **arguments)
     bool is_ok = true;
     printf("TAP version 13\n1..%u\n# seed %llu, %ld cycles each; again: hostile SEED CYCLES\n", 3 * storms,
            (unsigned long long)seed, cycles);
-    m_random = seed * 0x9E3779B97F4A7C15u + 1;
+    random_begin(seed * 0x9E3779B97F4A7C15u + 1);
     for (unsigned i = 0; i < storms; i++) {
         is_ok &= storm(platforms[i], cycles);
     }

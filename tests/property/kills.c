@@ -15,6 +15,7 @@
 
 #include "canopen_drives.h"
 #include "heave/cia402.h"
+#include "random.h"
 #include "rig.h"
 
 #define KILLS_DEFAULT  1000
@@ -53,18 +54,9 @@ static struct {
     bool is_first, had_torque;
 } m_seen[AXES];
 
-static uint64_t m_random;
 static long m_kills, m_enabled, m_targets, m_split, m_in_motion, m_sagged, m_without_power;
 static int32_t m_largest_first;
 static const char *m_wrong;
-
-static unsigned below(unsigned limit)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return (unsigned)(m_random >> 16) % limit;
-}
 
 static void wrong(const char *what, unsigned drive)
 {
@@ -249,8 +241,8 @@ static void come_up(void)
 /* Now, or within a set of frames. */
 static void die(void)
 {
-    m.sends_left = 1 + below(12);
-    const bool is_split = below(2) == 0;
+    m.sends_left = 1 + random_below(12);
+    const bool is_split = random_below(2) == 0;
     for (unsigned i = 0; is_split && i < PERIOD_US / CYCLE_US && m.is_alive; i++) {
         cycle();
     }
@@ -292,7 +284,7 @@ static void be_dead(void)
         cycle();
     }
     judge_stops(killed_us);
-    for (unsigned i = below(800); i > 0; i--) {
+    for (unsigned i = random_below(800); i > 0; i--) {
         cycle();
     }
     for (unsigned k = 0; k < AXES; k++) {
@@ -305,14 +297,14 @@ static void be_dead(void)
 /* What happens to drives without torque. */
 static void suffer(void)
 {
-    const unsigned k = below(AXES);
-    if (below(3) == 0) {
-        canopen_drives_place(&m.twin, k, canopen_drives_position(&m.twin, k) + (int32_t)below(4001) - 2000);
+    const unsigned k = random_below(AXES);
+    if (random_below(3) == 0) {
+        canopen_drives_place(&m.twin, k, canopen_drives_position(&m.twin, k) + (int32_t)random_below(4001) - 2000);
         m_seen[k].position = canopen_drives_position(&m.twin, k);
         m_sagged++;
     }
-    if (below(8) == 0) {
-        canopen_drives_power(&m.twin, below(AXES), true);
+    if (random_below(8) == 0) {
+        canopen_drives_power(&m.twin, random_below(AXES), true);
         m_without_power++;
     }
 }
@@ -357,7 +349,7 @@ static void power_up(void)
 /* Three of four lives end before they are up: setting up and enabling are what is tried here. */
 static unsigned lifetime(void)
 {
-    return below(4) == 0 ? 500 + below(6000) : below(2500);
+    return random_below(4) == 0 ? 500 + random_below(6000) : random_below(2500);
 }
 
 int main(int count, char **arguments)
@@ -365,7 +357,7 @@ int main(int count, char **arguments)
     const uint64_t seed = count > 1 ? strtoull(arguments[1], NULL, 0) : 20261122;
     const long kills = count > 2 ? strtol(arguments[2], NULL, 0) : KILLS_DEFAULT;
     printf("TAP version 13\n1..2\n# seed %llu, %ld kills; again: kills SEED KILLS\n", (unsigned long long)seed, kills);
-    m_random = seed * 0x9E3779B97F4A7C15u + 1;
+    random_begin(seed * 0x9E3779B97F4A7C15u + 1);
     configure();
     power_up();
     while (m_kills < kills && m_wrong == NULL) {

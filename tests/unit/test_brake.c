@@ -3,15 +3,14 @@
  */
 #include "../../src/motion/brake.h"
 
+#include "random.h"
 #include "unity.h"
 
 enum { STATES = 20000 };
 
-static uint64_t m_random;
-
 void setUp(void)
 {
-    m_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void) {}
@@ -19,10 +18,7 @@ void tearDown(void) {}
 /* From -limit to limit. */
 static q32_t random_within(q32_t limit_q32)
 {
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return (q32_t)(m_random % (2 * (uint64_t)limit_q32 + 1)) - limit_q32;
+    return (q32_t)(random_bits() % (2 * (uint64_t)limit_q32 + 1)) - limit_q32;
 }
 
 static ramp_t ramp_of(q32_t vel_q32, q32_t acc_q32, q32_t jerk_q32)

@@ -5,24 +5,15 @@
 
 #include <string.h>
 
+#include "random.h"
 #include "unity.h"
-
-static uint32_t seed;
 
 void setUp(void)
 {
-    seed = 2463534242u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void) {}
-
-static uint32_t next_random(void)
-{
-    seed ^= seed << 13;
-    seed ^= seed >> 17;
-    seed ^= seed << 5;
-    return seed;
-}
 
 /* Bit n of the value, from the least, as a DBC counts: upwards through the bytes, of a big-endian field from the highest bit
  * downwards in each byte, one byte after the other. */
@@ -78,7 +69,7 @@ static void test_pack_every_place_width_order_and_sign_matches_the_model(void)
                 check_value(&frame, high);
                 check_value(&frame, 0);
                 for (unsigned n = 0; n < 20; n++) {
-                    check_value(&frame, low + (int64_t)(next_random() % (uint64_t)(high - low + 1)));
+                    check_value(&frame, low + (int64_t)(random_bits() % (uint64_t)(high - low + 1)));
                 }
             }
         }
@@ -117,7 +108,7 @@ static void test_floats_are_those_of_the_machine_and_come_back_as_the_same_count
         TEST_ASSERT_EQUAL_INT64(CANRAW_FLOAT_MAX, canraw_field_max(&frame.field[0]));
         for (unsigned n = 0; n < 20000; n++) {
             const int64_t ends[] = {0, 1, -1, CANRAW_FLOAT_MAX, -CANRAW_FLOAT_MAX};
-            const int64_t counts = n < 5 ? ends[n] : (int64_t)(next_random() % (2u * CANRAW_FLOAT_MAX)) - CANRAW_FLOAT_MAX;
+            const int64_t counts = n < 5 ? ends[n] : (int64_t)(random_bits() % (2u * CANRAW_FLOAT_MAX)) - CANRAW_FLOAT_MAX;
             uint8_t out[8];
             TEST_ASSERT_EQUAL(HV_OK, canraw_pack(&frame, (const int64_t[CANRAW_VALUES]){counts}, out));
             const uint32_t bits = out[0] | (uint32_t)out[1] << 8 | (uint32_t)out[2] << 16 | (uint32_t)out[3] << 24;
@@ -134,7 +125,8 @@ static void test_floats_that_are_no_counts_are_no_frame(void)
     static const uint32_t k_factors[] = {1, 1000, 524288, 999983};
     canraw_frame_t frame = {.length = 4, .fields = 1, .field = {field_at(0, 32, 3)}};
     for (unsigned n = 0; n < 200000; n++) {
-        const uint32_t bits = n & 1 ? next_random() : (next_random() & 0x8FFFFFFFu) | 0x40000000u; /* every second near 1 */
+        const uint32_t bits =
+            n & 1 ? random_below(UINT32_MAX) : (random_below(UINT32_MAX) & 0x8FFFFFFFu) | 0x40000000u; /* every second near 1 */
         const uint8_t data[8] = {bits >> 24, bits >> 16 & 0xFF, bits >> 8 & 0xFF, bits & 0xFF};
         const uint32_t divisor = k_factors[n / 2 % 4];
         const double number = (double)float_of(bits) * divisor;
@@ -191,10 +183,10 @@ static void test_is_ambiguous_means_that_some_bytes_match_both(void)
         canraw_frame_t frame[2];
         memset(frame, 0, sizeof frame);
         for (unsigned i = 0; i < 2; i++) {
-            frame[i].length = 1 + next_random() % 3;
-            frame[i].constant = (uint8_t)(next_random() & ((1u << frame[i].length) - 1u));
+            frame[i].length = 1 + random_below(3);
+            frame[i].constant = (uint8_t)(random_below(UINT32_MAX) & ((1u << frame[i].length) - 1u));
             for (unsigned b = 0; b < 3; b++) {
-                frame[i].data[b] = frame[i].constant >> b & 1 ? next_random() & 1 : 0;
+                frame[i].data[b] = frame[i].constant >> b & 1 ? random_below(UINT32_MAX) & 1 : 0;
             }
         }
         bool is_found = false;

@@ -20,6 +20,7 @@
 
 #include "heave/kin.h"
 #include "heave/number.h"
+#include "random.h"
 #include "unity.h"
 
 #define FILE_NAME "test_config.tmp.ini"
@@ -34,27 +35,18 @@ static char m_errors[200000];
 static char m_text[TEXT_MAX];
 static char m_line[LINES_MAX][256];
 static unsigned m_lines;
-static uint32_t m_random;
 
 void setUp(void)
 {
     memset(&m_config, 0, sizeof m_config);
     m_errors[0] = '\0';
     m_lines = 0;
-    m_random = 2463534242u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void)
 {
     remove(FILE_NAME);
-}
-
-static uint32_t next_random(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 17;
-    m_random ^= m_random << 5;
-    return m_random;
 }
 
 /* ---- Files ---- */
@@ -1187,7 +1179,8 @@ static void test_load_defaults_stand_where_keys_are_left_out(void)
 static void test_text_q16_reads_back_as_the_same_value(void)
 {
     for (unsigned i = 0; i < 20000; i++) {
-        const q16_t value_q16 = i < 2 ? (i == 0 ? INT32_MAX : INT32_MIN) : (q16_t)(next_random() >> (next_random() % 20u));
+        const q16_t value_q16 =
+            i < 2 ? (i == 0 ? INT32_MAX : INT32_MIN) : (q16_t)(random_below(UINT32_MAX) >> (random_below(20u)));
         config_text_t text;
         q16_t back_q16 = 0;
         config_text_clear(&text);
@@ -1391,9 +1384,9 @@ static void test_load_random_bytes_only_give_errors(void)
     static const char letters[] = "[]=:;#, \t\r\n\"0123456789.-eabcdefghijklmnopqrstuvwxyz_";
     static char bytes[1500];
     for (unsigned run = 0; run < 400; run++) {
-        const size_t length = next_random() % sizeof bytes;
+        const size_t length = random_below(sizeof bytes);
         for (size_t i = 0; i < length; i++)
-            bytes[i] = run % 2 == 0 ? (char)next_random() : letters[next_random() % (sizeof letters - 1)];
+            bytes[i] = run % 2 == 0 ? (char)random_below(UINT32_MAX) : letters[random_below(sizeof letters - 1)];
         const int count = load_bytes(bytes, length);
         TEST_ASSERT_GREATER_THAN_INT(0, count);
         expect_sane(count);
@@ -1408,13 +1401,13 @@ static void test_load_good_files_with_random_damage_give_errors_or_load(void)
     for (unsigned run = 0; run < 600; run++) {
         const size_t length = read_all(platform_path(k_platforms[run % 5u]), good, sizeof good);
         memcpy(text, good, length);
-        for (unsigned hits = next_random() % 4u + 1u; hits > 0; hits--) {
-            const size_t at = next_random() % length;
-            const size_t from = next_random() % length;
-            const size_t size = next_random() % 30u;
-            switch (next_random() % 3u) {
+        for (unsigned hits = random_below(4u) + 1u; hits > 0; hits--) {
+            const size_t at = random_below((uint32_t)length);
+            const size_t from = random_below((uint32_t)length);
+            const size_t size = random_below(30u);
+            switch (random_below(3u)) {
             case 0:
-                text[at] = (char)next_random();
+                text[at] = (char)random_below(UINT32_MAX);
                 break;
             case 1:
                 text[at] = good[from];
@@ -1707,7 +1700,7 @@ static void test_load_sizes_give_the_joints_of_the_ready_made_platforms(void)
 static void test_load_sizes_agree_with_a_model_and_are_dumped_as_joints(void)
 {
     for (unsigned run = 0; run < 60; run++) {
-        const double turn = (int)(next_random() % 3600) / 10.0 - 180, spread = 4 + next_random() % 40;
+        const double turn = (int)(random_below(3600)) / 10.0 - 180, spread = 4 + random_below(40);
         char text[20];
         take_file_without_joints("hexapod-400.ini", 6);
         set_key("platform", "kind", "hexapod");

@@ -5,13 +5,13 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "random.h"
 #include "rig.h"
 #include "unity.h"
 
 static rig_t m_rig;
 static rig_t m_ready; /* following, at neutral, nothing moving */
 static bool m_is_ready;
-static uint64_t m_random;
 
 /* What the pose axes did in the cycles of a test. */
 static struct {
@@ -20,15 +20,9 @@ static struct {
     unsigned cycles, off_path;
 } m_seen;
 
-static double between(double low, double high)
-{
-    m_random = m_random * 6364136223846793005u + 1442695040888963407u;
-    return low + (high - low) * (double)(m_random >> 11) / 9007199254740992.0;
-}
-
 void setUp(void)
 {
-    m_random = 20261130;
+    random_begin(RANDOM_SEED);
     if (!m_is_ready) {
         const settings_t settings = rig_hexapod();
         rig_start(&m_rig, &settings, true);
@@ -92,9 +86,9 @@ static ride_t some_ride(double low_hz, double high_hz)
 {
     ride_t ride;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        ride.size[i] = between(0.5, 1) * (i < AXIS_X ? 3 : 15);
-        ride.hz[i] = between(low_hz, high_hz);
-        ride.phase[i] = between(0, 6.28);
+        ride.size[i] = random_between(0.5, 1) * (i < AXIS_X ? 3 : 15);
+        ride.hz[i] = random_between(low_hz, high_hz);
+        ride.phase[i] = random_between(0, 6.28);
     }
     return ride;
 }
@@ -176,7 +170,7 @@ static void test_noise_of_all_axes_leaves_no_cylinder_behind(void)
             if (t % 50 % 17 == 0) {
                 double pose[POSE_AXES];
                 for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-                    pose[axis] = between(-size, size) * (axis < AXIS_X ? 0.3 : 3);
+                    pose[axis] = random_between(-size, size) * (axis < AXIS_X ? 0.3 : 3);
                 }
                 send(pose);
             }
@@ -200,7 +194,7 @@ static void test_noise_that_begins_at_rest_hardly_leaves_its_range(void)
                 double pose[POSE_AXES];
                 for (unsigned axis = 0; axis < POSE_AXES; axis++) {
                     const bool is_noisy = t >= 1500 && (k_axes[i % 5] >> axis & 1) != 0;
-                    pose[axis] = is_noisy ? between(-size, size) * (axis < AXIS_X ? 0.2 : 1) : 0;
+                    pose[axis] = is_noisy ? random_between(-size, size) * (axis < AXIS_X ? 0.2 : 1) : 0;
                 }
                 send(pose);
             }
@@ -243,7 +237,7 @@ static void test_what_stops_dead_hardly_leaves_its_line(void)
         m_rig = m_ready;
         m_seen.cycles = 0;
         for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-            way[axis] = between(-1, 1) * (axis < AXIS_X ? 6 : 60);
+            way[axis] = random_between(-1, 1) * (axis < AXIS_X ? 6 : 60);
         }
         for (unsigned t = 0; t < 1500; t++) {
             const double share = sin(0.004 * (t < 200 ? t : 200));

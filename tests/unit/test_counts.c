@@ -3,6 +3,7 @@
  */
 #include "heave/counts.h"
 
+#include "random.h"
 #include "unity.h"
 
 #define MM(x) ((q32_t)(x)*Q32_ONE)
@@ -69,11 +70,9 @@ static void test_there_and_back_is_the_same_count(void)
  * for 64 bits. */
 static void test_from_units_random_scales_are_nearest(void)
 {
-    uint64_t seed = 88172645463325252u;
+    random_begin(RANDOM_SEED);
     for (int n = 0; n < 200000; n++) {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
+        const uint64_t seed = random_bits();
         const counts_scale_t scale = {(int32_t)(seed % 2001) - 1000, (int32_t)(seed >> 20 & 1023) + 1,
                                       (int32_t)(seed >> 32 & 255)};
         const q32_t units_q32 = (q32_t)(seed >> 12) - (INT64_C(1) << 51);

@@ -12,6 +12,7 @@
 #include "config/config.h"
 #include "platform/load.h"
 #include "inspect/dcf_startup.h"
+#include "random.h"
 #include "unity.h"
 
 #define PRESET    HEAVE_CONFIG_DIR "/hexapod-cia402.ini"
@@ -301,16 +302,6 @@ static void test_import_of_several_files_keeps_apart_what_is_one_drives_own(void
 
 /* --- Files that nobody has written --- */
 
-static uint32_t m_seed;
-
-static uint32_t below(uint32_t bound)
-{
-    m_seed ^= m_seed << 13;
-    m_seed ^= m_seed >> 17;
-    m_seed ^= m_seed << 5;
-    return m_seed % bound;
-}
-
 static unsigned put_random_file(void)
 {
     static const char *const k_values[] = {"0",
@@ -340,20 +331,20 @@ static unsigned put_random_file(void)
     static const unsigned k_types[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 15, 21, 27};
     const unsigned values = sizeof k_values / sizeof k_values[0];
     unsigned settings = 0;
-    put("[DeviceInfo]\nVendorNumber=%u\n", below(2) == 0 ? 0xFB : 1);
-    for (unsigned i = 1 + below(40); i > 0; i--) {
+    put("[DeviceInfo]\nVendorNumber=%u\n", random_below(2) == 0 ? 0xFB : 1);
+    for (unsigned i = 1 + random_below(40); i > 0; i--) {
         char place[16];
         char more[120] = "";
-        snprintf(place, sizeof place, below(2) == 0 ? "%04X" : "%04Xsub%X",
-                 k_index[below(sizeof k_index / sizeof k_index[0])] + below(2), below(3));
-        if (below(3) > 0) {
-            snprintf(more, sizeof more, "DefaultValue=%s\n", k_values[below(values)]);
+        snprintf(place, sizeof place, random_below(2) == 0 ? "%04X" : "%04Xsub%X",
+                 k_index[random_below(sizeof k_index / sizeof k_index[0])] + random_below(2), random_below(3));
+        if (random_below(3) > 0) {
+            snprintf(more, sizeof more, "DefaultValue=%s\n", k_values[random_below(values)]);
         }
-        if (below(4) > 0) {
-            snprintf(more + strlen(more), sizeof more - strlen(more), "ParameterValue=%s\n", k_values[below(values)]);
+        if (random_below(4) > 0) {
+            snprintf(more + strlen(more), sizeof more - strlen(more), "ParameterValue=%s\n", k_values[random_below(values)]);
             settings++;
         }
-        put_object(place, k_types[below(sizeof k_types / sizeof k_types[0])], k_access[below(6)], more);
+        put_object(place, k_types[random_below(sizeof k_types / sizeof k_types[0])], k_access[random_below(6)], more);
     }
     return settings;
 }
@@ -372,11 +363,11 @@ static unsigned count_lines(const char *start)
 static void test_import_of_any_file_loses_nothing_and_loads(void)
 {
     for (unsigned i = 0; i < RANDOM; i++) {
-        m_seed = i + 1;
+        random_begin(i + 1);
         const unsigned settings = put_random_file();
         unsigned defaults = 0;
         read_file(0);
-        (void)import(1, below(2) == 0 ? "cia402-startup" : "cia402-startup-6");
+        (void)import(1, random_below(2) == 0 ? "cia402-startup" : "cia402-startup-6");
         const char *same = strstr(m_out, " more hold their defaults");
         if (same != NULL) {
             while (same[-1] != ' ') {

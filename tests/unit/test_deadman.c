@@ -2,6 +2,7 @@
  * test_deadman.c - a hand: how long it counts, and what an old proof of it is worth.
  */
 #include "heave/deadman.h"
+#include "random.h"
 #include "unity.h"
 
 #define T0 1000000u
@@ -118,13 +119,10 @@ static void test_release_ends_at_once_and_a_beat_does_not_bring_it_back(void)
 /* Whatever arrives, in whatever order: nobody is held for longer than 250 ms after the newest tick that was echoed. */
 static void test_random_traffic_never_holds_beyond_the_newest_echo(void)
 {
-    uint32_t random = 2463534242u;
     uint64_t newest_us = 0; /* tick echoed, of what was taken or not */
     uint32_t series = 0;
     for (uint32_t n = 0; n < 1000000u; n++) {
-        random ^= random << 13;
-        random ^= random >> 17;
-        random ^= random << 5;
+        const uint32_t random = random_below(UINT32_MAX);
         const uint64_t now_us = T0 + n * 1000u;
         const uint64_t age_us = (random >> 8) % 600000u;
         const bool is_quiet = n / 700u % 2u == 1u;

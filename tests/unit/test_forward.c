@@ -11,6 +11,7 @@
 
 #include "config/config.h"
 #include "platform/load.h"
+#include "random.h"
 #include "unity.h"
 
 #define ERROR_MM_Q32  (Q32_ONE / 1000)
@@ -30,25 +31,15 @@ typedef struct {
 
 static platform_t m_platform;
 static config_t m_config;
-static uint64_t m_random;
 static unsigned m_most, m_count, m_near_most;
 static q32_t m_worst_mm_q32, m_worst_deg_q32;
 
 void setUp(void)
 {
-    m_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void) {}
-
-/* From -1 to 1. */
-static double random_unit(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return (double)(m_random >> 11) / 4503599627370496.0 - 1;
-}
 
 static bool is_free(unsigned axis)
 {
@@ -130,7 +121,7 @@ static void expect_all(const pose_t *pose)
     pose_t near = *pose;
     expect_found(pose, &m_platform.neutral, "neutral", &m_most);
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        beside[axis] = random_unit() * (axis < AXIS_X ? 3 : 20);
+        beside[axis] = random_between(-1, 1) * (axis < AXIS_X ? 3 : 20);
         near.axis_q32[axis] += is_free(axis) ? (q32_t)(beside[axis] * (double)Q32_ONE) : 0;
     }
     expect_found(pose, &near, "beside", &m_near_most);
@@ -140,8 +131,8 @@ static void expect_all(const pose_t *pose)
 static void random_way(double way[POSE_AXES])
 {
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        const double part = random_unit();
-        way[axis] = random_unit() < -0.3 ? 0 : part * m_platform.range[axis];
+        const double part = random_between(-1, 1);
+        way[axis] = random_between(-1, 1) < -0.3 ? 0 : part * m_platform.range[axis];
     }
 }
 
@@ -178,7 +169,7 @@ static void check_platform(void)
         double way[POSE_AXES];
         random_way(way);
         const double edge = edge_of(way);
-        const pose_t at_edge = pose_at(way, edge), within = pose_at(way, edge * fabs(random_unit()));
+        const pose_t at_edge = pose_at(way, edge), within = pose_at(way, edge * fabs(random_between(-1, 1)));
         expect_all(&at_edge);
         expect_all(&within);
         expect_found(&within, &at_edge, "the edge", &m_near_most);

@@ -5,26 +5,17 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "random.h"
 #include "unity.h"
 
 #include "heave/hal/udp.h"
 
-static uint64_t seed;
-
 void setUp(void)
 {
-    seed = 88172645463325252u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void) {}
-
-static uint32_t next_random(void)
-{
-    seed ^= seed << 13;
-    seed ^= seed >> 7;
-    seed ^= seed << 17;
-    return (uint32_t)(seed >> 32);
-}
 
 static void assert_text(const char *expected, const hal_udp_peer_t *peer)
 {
@@ -64,11 +55,11 @@ static void test_peer_text_random_ipv6_matches_inet_ntop(void)
 {
     unsigned compared = 0;
     for (unsigned i = 0; i < 100000; i++) {
-        hal_udp_peer_t peer = {.is_ipv6 = true, .port = (uint16_t)next_random()};
+        hal_udp_peer_t peer = {.is_ipv6 = true, .port = (uint16_t)(uint32_t)(random_bits() >> 32)};
         char address[INET6_ADDRSTRLEN], expected[80];
         unsigned leading = 0;
         for (unsigned g = 0; g < 8; g++) {
-            const uint32_t bits = next_random();
+            const uint32_t bits = (uint32_t)(random_bits() >> 32);
             const uint32_t value = bits % 3 != 0 ? 0 : bits >> 16 >> (bits >> 8 & 15);
             peer.address[2 * g] = (uint8_t)(value >> 8);
             peer.address[2 * g + 1] = (uint8_t)value;
@@ -129,14 +120,14 @@ static void test_is_same_host_tells_addresses_and_widths_not_ports(void)
 static void test_rank_random_networks_match_bit_by_bit(void)
 {
     for (unsigned round = 0; round < 20000; round++) {
-        hal_udp_network_t network = {.is_ipv6 = next_random() & 1u};
-        network.prefix = (uint8_t)(next_random() % (network.is_ipv6 ? 129u : 33u));
-        hal_udp_peer_t peer = {.is_ipv6 = (next_random() & 7u) == 0 ? !network.is_ipv6 : network.is_ipv6};
+        hal_udp_network_t network = {.is_ipv6 = (uint32_t)(random_bits() >> 32) & 1u};
+        network.prefix = (uint8_t)((uint32_t)(random_bits() >> 32) % (network.is_ipv6 ? 129u : 33u));
+        hal_udp_peer_t peer = {.is_ipv6 = ((uint32_t)(random_bits() >> 32) & 7u) == 0 ? !network.is_ipv6 : network.is_ipv6};
         for (unsigned i = 0; i < (network.is_ipv6 ? 16u : 4u); i++) {
-            network.address[i] = (uint8_t)next_random();
+            network.address[i] = (uint8_t)(uint32_t)(random_bits() >> 32);
             peer.address[i] = network.address[i];
         }
-        const unsigned flipped = next_random() % (network.is_ipv6 ? 128u : 32u);
+        const unsigned flipped = (uint32_t)(random_bits() >> 32) % (network.is_ipv6 ? 128u : 32u);
         peer.address[flipped / 8] ^= (uint8_t)(0x80u >> flipped % 8);
         const hal_udp_networks_t list = {.count = 1, .network = {network}};
         const bool is_in = peer.is_ipv6 == network.is_ipv6 && flipped >= network.prefix;

@@ -5,23 +5,22 @@
 #include <math.h>
 
 #include "heave/intensity.h"
+#include "random.h"
 #include "unity.h"
 
 #define CYCLE_US 1000u
 #define RAMP_MS  2000u
 
 static intensity_t m_intensity;
-static uint64_t m_random;
 
-static int64_t random_below(int64_t limit)
+static int64_t random_to(int64_t limit)
 {
-    m_random = m_random * 6364136223846793005u + 1442695040888963407u;
-    return (int64_t)(m_random >> 2) % limit;
+    return (int64_t)(random_bits() >> 2) % limit;
 }
 
 void setUp(void)
 {
-    m_random = 20240607;
+    random_begin(RANDOM_SEED);
     TEST_ASSERT_EQUAL(HV_OK, intensity_init(&m_intensity, 100, 100, RAMP_MS, CYCLE_US));
 }
 
@@ -87,8 +86,8 @@ static void test_intensity_step_changed_on_the_way_stays_smooth_and_inside(void)
     TEST_ASSERT_EQUAL(HV_OK, intensity_init(&m_intensity, 30, 80, RAMP_MS, CYCLE_US));
     watch_t watch = watch_start();
     for (unsigned change = 0; change < 300; change++) {
-        TEST_ASSERT_EQUAL(HV_OK, intensity_set(&m_intensity, (unsigned)random_below(81)));
-        for (int64_t cycles = random_below(1500); cycles > 0; cycles--) {
+        TEST_ASSERT_EQUAL(HV_OK, intensity_set(&m_intensity, (unsigned)random_to(81)));
+        for (int64_t cycles = random_to(1500); cycles > 0; cycles--) {
             watch_cycle(&watch, 2000);
         }
     }
@@ -141,8 +140,8 @@ static void test_intensity_place_is_there_at_once(void)
 static ramp_ref_t random_ref(void)
 {
     const int64_t range = q32_from_int(4000);
-    return (ramp_ref_t){random_below(range) - range / 2, random_below(range / 1000), -random_below(range / 100000),
-                        random_below(range / 10000000)};
+    return (ramp_ref_t){random_to(range) - range / 2, random_to(range / 1000), -random_to(range / 100000),
+                        random_to(range / 10000000)};
 }
 
 static void test_intensity_scale_at_100_is_the_reference_itself(void)

@@ -5,23 +5,17 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "random.h"
 #include "rig.h"
 #include "unity.h"
 
 static rig_t m_rig;
 static rig_t m_ready; /* following, at neutral, nothing moving */
 static bool m_is_ready;
-static uint64_t m_random;
-
-static double unit(void)
-{
-    m_random = m_random * 6364136223846793005u + 1442695040888963407u;
-    return (double)(m_random >> 11) / 9007199254740992.0;
-}
 
 void setUp(void)
 {
-    m_random = 20261129;
+    random_begin(RANDOM_SEED);
     if (!m_is_ready) {
         settings_t settings = rig_hexapod();
         settings.spike_gate = 10;
@@ -189,7 +183,7 @@ static void test_more_of_them_than_can_be_made_go_no_further_than_the_last(void)
 static double noise(unsigned ms, double size)
 {
     (void)ms;
-    return size * (2 * unit() - 1);
+    return size * (2 * random_unit() - 1);
 }
 
 /* That would be a chase at all of the limits. */
@@ -218,8 +212,8 @@ static void test_anything_may_follow_at_any_moment(void)
 {
     for (unsigned i = 0; i < 60; i++) {
         m_rig = m_ready;
-        const double size = 3 + 9 * unit();
-        (void)run(once, size, 2 * unit(), (unsigned)(600 * unit()));
+        const double size = 3 + 9 * random_unit();
+        (void)run(once, size, 2 * random_unit(), (unsigned)(600 * random_unit()));
         if (i % 3 == 0) {
             rig_send(&m_rig, "@A6T:0,0,0,-20,0,10,700#");
             rig_run_ms(&m_rig, 2500);

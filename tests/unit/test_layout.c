@@ -13,6 +13,7 @@
 #include "config/config.h"
 #include "platform/load.h"
 #include "heave/number.h"
+#include "random.h"
 #include "unity.h"
 
 static const char *const k_hexapods[] = {"demo-hexapod.ini", "hexapod-400.ini", "hexapod-435-300.ini"};
@@ -22,7 +23,6 @@ static const char *const k_tripods[] = {"tripod.ini", "tripod-rotation.ini"};
 static config_t m_config;
 static kin_geometry_t *const m_geometry = &m_config.settings.geometry;
 static char m_errors[4000];
-static uint32_t m_random = 2463534242u;
 
 void setUp(void) {}
 
@@ -231,20 +231,12 @@ static void test_the_digit_of_the_example_is_named_with_its_value(void)
 
 /* --- Nothing wrong --- */
 
-static double next_random(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 17;
-    m_random ^= m_random << 5;
-    return (double)m_random / 4294967296.0 * 2 - 1;
-}
-
 static void turn(q16_t joint[3], double angle, double scale, double noise_mm)
 {
     const double x = joint[0], y = joint[1];
-    joint[0] = (q16_t)((x * cos(angle) - y * sin(angle)) * scale + next_random() * noise_mm * 65536);
-    joint[1] = (q16_t)((x * sin(angle) + y * cos(angle)) * scale + next_random() * noise_mm * 65536);
-    joint[2] += (q16_t)(next_random() * noise_mm * 65536);
+    joint[0] = (q16_t)((x * cos(angle) - y * sin(angle)) * scale + random_between(-1, 1) * noise_mm * 65536);
+    joint[1] = (q16_t)((x * sin(angle) + y * cos(angle)) * scale + random_between(-1, 1) * noise_mm * 65536);
+    joint[2] += (q16_t)(random_between(-1, 1) * noise_mm * 65536);
 }
 
 /* A tape measures to some mm, and nobody has to put cylinder 1 in front. */
@@ -252,7 +244,7 @@ static void test_platforms_measured_with_a_tape_are_not_refused(void)
 {
     for (unsigned run = 0; run < 3000; run++) {
         load_platform(run % 100u == 0 ? k_hexapods[run / 100u % HEXAPODS] : "demo-hexapod.ini");
-        const double angle = next_random() * 3.14, noise_mm = run % 3u * 2.0;
+        const double angle = random_between(-1, 1) * 3.14, noise_mm = run % 3u * 2.0;
         for (unsigned i = 0; i < 6; i++) {
             turn(m_geometry->base_mm_q16[i], angle, 1, noise_mm);
             turn(m_geometry->plate_mm_q16[i], angle, 1, noise_mm);

@@ -7,19 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "random.h"
 #include "rig.h"
 #include "unity.h"
 
 static rig_t m_rig;
 static rig_t m_ready; /* following, at neutral, nothing moving */
 static bool m_is_ready;
-static uint64_t m_random;
-
-static unsigned random_below(unsigned limit)
-{
-    m_random = m_random * 6364136223846793005u + 1442695040888963407u;
-    return (unsigned)(m_random >> 33) % limit;
-}
 
 /* Up and following, with the take-over of the first pose behind it. */
 static void engage(const settings_t *settings)
@@ -34,7 +28,7 @@ static void engage(const settings_t *settings)
 void setUp(void)
 {
     const settings_t settings = rig_hexapod();
-    m_random = 4711;
+    random_begin(RANDOM_SEED);
     if (!m_is_ready) {
         engage(&settings);
         m_ready = m_rig;

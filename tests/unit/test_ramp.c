@@ -10,31 +10,17 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "random.h"
 #include "unity.h"
 
 #define UM_Q32 ((q32_t)(4294967296.0 / 1000))
 
-static uint64_t m_random;
-
 void setUp(void)
 {
-    m_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void) {}
-
-static uint64_t random_bits(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return m_random;
-}
-
-static double random_unit(void)
-{
-    return (double)(random_bits() >> 11) / 9007199254740992.0;
-}
 
 static double random_log(double low, double high)
 {

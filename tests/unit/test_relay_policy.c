@@ -3,6 +3,7 @@
  */
 #include <string.h>
 
+#include "random.h"
 #include "unity.h"
 
 #include "heave/relay_policy.h"
@@ -117,16 +118,6 @@ static void test_step_longest_time_does_not_wait_for_the_shortest(void)
     assert_for(10, 1, 0);
 }
 
-static uint32_t m_random;
-
-static uint32_t next_random(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 17;
-    m_random ^= m_random << 5;
-    return m_random;
-}
-
 /* What must hold of any relay, judged from the masks alone. */
 typedef struct {
     uint64_t closed_since_us, changed_us;
@@ -158,13 +149,13 @@ static void test_step_at_random_keeps_every_limit(void)
 {
     seen_t seen[HAL_RELAYS_MAX] = {{0}};
     uint16_t asked = 0;
-    m_random = 2463534242u;
+    random_begin(RANDOM_SEED);
     for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
         m_settings.relays.min_toggle_ms[i] = i % 3 * 7;
         m_settings.relays.max_on_ms[i] = i % 4 * 15;
     }
     for (unsigned cycle = 0; cycle < 200000; cycle++) {
-        asked = next_random() % 4 == 0 ? asked ^ (uint16_t)(1u << next_random() % 12) : asked;
+        asked = random_below(4) == 0 ? asked ^ (uint16_t)(1u << random_below(12)) : asked;
         const bool is_safe = cycle / 100 % 5 == 4;
         const uint16_t mask = is_safe ? step_safe(0) : step(asked);
         for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {

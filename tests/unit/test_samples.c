@@ -16,6 +16,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "random.h"
 #include "unity.h"
 
 #define READERS         8u
@@ -251,16 +252,14 @@ static void test_memory_that_contradicts_itself_is_refused(void)
     open_ring(1);
     const samples_header_t *good = m_writer.header;
     TEST_ASSERT_NOT_NULL(samples_reader_begin(&reader, good, 100));
-    uint32_t random = 2463534242u;
+    uint32_t random = 1;
     unsigned refused = 0;
     for (unsigned run = 0; run < 200000; run++) {
         memcpy(memory.word, good, 8192);
         memory.header.capacity = 2;
         memory.header.record_bytes = 400;
         for (unsigned k = 0; k < 3; k++) {
-            random ^= random << 13;
-            random ^= random >> 17;
-            random ^= random << 5;
+            random = random_below(UINT32_MAX);
             const uint32_t value = random % 3 == 0 ? random : random >> 24;
             const uint32_t at = random % 40 + (k == 2 ? 32 * (random >> 8) % 1000 : 0);
             memcpy((char *)memory.word + 4 * at, &value, sizeof value);

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "random.h"
 #include "rig.h"
 #include "unity.h"
 
@@ -877,14 +878,12 @@ static void test_signal_is_refused_by_name(void)
 /* Hands that come and go at random, with any request, for minutes: limits hold, and without a hand everything rests. */
 static void test_random_hands_never_move_anything_alone(void)
 {
-    uint32_t random = 88172645u;
+    random_begin(RANDOM_SEED);
     unsigned away_ms = 0, moved = 0;
     uint32_t was_led = 0;
     start(true);
     for (unsigned n = 0; n < 60000; n++) {
-        random ^= random << 13;
-        random ^= random >> 17;
-        random ^= random << 5;
+        const uint32_t random = random_below(UINT32_MAX);
         const bool is_away = n / 1500u % 2u == 1u;
         const unsigned what = random % 40u;
         if (!is_away && what == 0) {

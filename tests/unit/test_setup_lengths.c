@@ -5,37 +5,27 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "random.h"
 #include "setup/lengths.h"
 #include "unity.h"
 
 #define MACHINES 300u
 #define DEGREE   (3.14159265358979323846 / 180)
 
-static uint64_t s_random = 88172645463325252u;
-
 void setUp(void) {}
 void tearDown(void) {}
-
-/* -1 to 1, even. */
-static double even(void)
-{
-    s_random ^= s_random << 13;
-    s_random ^= s_random >> 7;
-    s_random ^= s_random << 17;
-    return (double)(s_random >> 11) / (double)(1ull << 52) - 1;
-}
 
 /* Not quite regular, as machines are: each joint some mm beside its place. */
 static void make(lengths_set_t set, double joint[LENGTHS_JOINTS][2], double beside_mm)
 {
-    const double radius = 700 + 500 * even(), spread = 25 + 15 * even();
+    const double radius = 700 + 500 * random_between(-1, 1), spread = 25 + 15 * random_between(-1, 1);
     double middle[2] = {0};
     for (unsigned i = 0; i < LENGTHS_JOINTS; i++) {
         const unsigned place = set == LENGTHS_BASE ? i : i + 1u;
         const double centre = 120.0 * (place / 2u) + (set == LENGTHS_BASE ? 0 : -60);
         const double angle = (centre + (place % 2u == 0 ? -spread / 2 : spread / 2)) * DEGREE;
-        joint[i][0] = radius * cos(angle) + beside_mm * even();
-        joint[i][1] = radius * sin(angle) + beside_mm * even();
+        joint[i][0] = radius * cos(angle) + beside_mm * random_between(-1, 1);
+        joint[i][1] = radius * sin(angle) + beside_mm * random_between(-1, 1);
         middle[0] += joint[i][0] / LENGTHS_JOINTS;
         middle[1] += joint[i][1] / LENGTHS_JOINTS;
     }
@@ -50,7 +40,7 @@ static void measure(double joint[LENGTHS_JOINTS][2], double off_mm, double dista
     for (unsigned pair = 0; pair < LENGTHS_PAIRS; pair++) {
         unsigned a = 0, b = 0;
         lengths_pair(pair, &a, &b);
-        distance_mm[pair] = hypot(joint[a][0] - joint[b][0], joint[a][1] - joint[b][1]) + off_mm * even();
+        distance_mm[pair] = hypot(joint[a][0] - joint[b][0], joint[a][1] - joint[b][1]) + off_mm * random_between(-1, 1);
     }
 }
 

@@ -3,6 +3,7 @@
  * Signals and arrivals are made here in double precision; the period is that of the sender, as a settled clock finds it.
  */
 #include "heave/spike_filter.h"
+#include "random.h"
 #include "unity.h"
 
 #include <math.h>
@@ -14,7 +15,6 @@
 #define SINES  6
 
 static spike_filter_t s_gate;
-static uint64_t s_random;
 
 void hv_assert_failed(const char *file, int line)
 {
@@ -33,19 +33,11 @@ static void start(uint32_t factor)
 
 void setUp(void)
 {
-    s_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
     start(FACTOR);
 }
 
 void tearDown(void) {}
-
-static double unit(void)
-{
-    s_random ^= s_random << 13;
-    s_random ^= s_random >> 7;
-    s_random ^= s_random << 17;
-    return (double)(s_random >> 11) / 9007199254740992.0;
-}
 
 /* A sample with one axis away from zero, and the same for all axes. */
 static bool push(double at_s, uint32_t period_us, unsigned axis, double value)
@@ -64,9 +56,9 @@ static void make_signal(double share)
 {
     double accel = 0;
     for (int i = 0; i < SINES; i++) {
-        s_signal.hz[i] = 0.1 * pow(30, (i + unit()) / SINES);
-        s_signal.phase[i] = 6.283185307 * unit();
-        s_signal.amplitude[i] = (0.3 + unit()) / pow(s_signal.hz[i], 1.2);
+        s_signal.hz[i] = 0.1 * pow(30, (i + random_unit()) / SINES);
+        s_signal.phase[i] = 6.283185307 * random_unit();
+        s_signal.amplitude[i] = (0.3 + random_unit()) / pow(s_signal.hz[i], 1.2);
         accel += s_signal.amplitude[i] * pow(6.283185307 * s_signal.hz[i], 2);
     }
     s_signal.speed = 0;
@@ -97,10 +89,10 @@ typedef struct {
 
 static double arrival(const network_t *network, double sent, double *held_until, double before)
 {
-    if (unit() < network->burst) {
-        *held_until = sent + 0.05 * unit();
+    if (random_unit() < network->burst) {
+        *held_until = sent + 0.05 * random_unit();
     }
-    const double through = sent + 0.002 + 0.001 * network->jitter_ms * unit();
+    const double through = sent + 0.002 + 0.001 * network->jitter_ms * random_unit();
     const double at = fmax(fmax(through, *held_until), before);
     return ceil(at * 1000) / 1000;
 }
@@ -117,7 +109,7 @@ static void test_gate_passes_ordinary_motion_at_all_rates(void)
                 make_signal(k_shares[run % 5]);
                 for (double t = 0; t < 20; t += 1 / k_rates_hz[r]) {
                     const double at = arrival(&k_networks[n], t, &held, before);
-                    if (unit() < k_networks[n].loss) {
+                    if (random_unit() < k_networks[n].loss) {
                         continue;
                     }
                     before = at;
@@ -136,8 +128,8 @@ static void test_gate_passes_frames_that_come_twice(void)
     for (int i = 0; i < 5000; i++) {
         const double t = i * 0.01, value = signal_at(t);
         TEST_ASSERT_TRUE(push(t, 10000, AXIS_Z, value));
-        if (unit() < 0.3) {
-            TEST_ASSERT_TRUE(push(t + 0.009 * unit(), 10000, AXIS_Z, value));
+        if (random_unit() < 0.3) {
+            TEST_ASSERT_TRUE(push(t + 0.009 * random_unit(), 10000, AXIS_Z, value));
         }
     }
 }
@@ -184,12 +176,12 @@ static void test_gate_random_spikes_none_followed_and_nothing_else_lost(void)
             make_signal(1);
             for (double t = 0; t < 20; t += 1 / k_rates_hz[r]) {
                 const double at = arrival(&network, t, &held, before);
-                if (unit() < network.loss) {
+                if (random_unit() < network.loss) {
                     continue;
                 }
                 before = at;
-                const bool is_spike = ++since > 10 && unit() < 0.05;
-                const double off = (unit() < 0.5 ? -1 : 1) * wild(k_rates_hz[r]) * (1 + 5 * unit());
+                const bool is_spike = ++since > 10 && random_unit() < 0.05;
+                const double off = (random_unit() < 0.5 ? -1 : 1) * wild(k_rates_hz[r]) * (1 + 5 * random_unit());
                 since = is_spike ? 8 : since; /* at least two good ones in between */
                 TEST_ASSERT_EQUAL(!is_spike,
                                   push(at, (uint32_t)(1e6 / k_rates_hz[r]), axis, signal_at(t) + (is_spike ? off : 0)));
@@ -231,12 +223,12 @@ static void test_gate_random_steps_come_one_sample_later_and_are_no_spikes(void)
             make_signal(1);
             for (double t = 0; t < 20; t += 1 / k_rates_hz[r]) {
                 const double at = arrival(&network, t, &held, before);
-                if (unit() < network.loss) {
+                if (random_unit() < network.loss) {
                     continue;
                 }
                 before = at;
-                const bool is_step = ++since > 12 && unit() < 0.05;
-                base += is_step ? (base > 0 ? -1 : 1) * wild(k_rates_hz[r]) * (1 + unit()) : 0;
+                const bool is_step = ++since > 12 && random_unit() < 0.05;
+                base += is_step ? (base > 0 ? -1 : 1) * wild(k_rates_hz[r]) * (1 + random_unit()) : 0;
                 since = is_step ? 0 : since;
                 withheld += is_step;
                 TEST_ASSERT_EQUAL(!is_step, push(at, (uint32_t)(1e6 / k_rates_hz[r]), AXIS_Z, signal_at(t) + base));
@@ -255,9 +247,9 @@ static void test_gate_noise_withholds_at_most_every_other_sample(void)
     for (int i = 0; i < 100000; i++) {
         q32_t sample[POSE_AXES];
         for (unsigned a = 0; a < POSE_AXES; a++) {
-            sample[a] = (q32_t)((unit() - 0.5) * 36028797018963968.0); /* +-2^54 */
+            sample[a] = (q32_t)((random_unit() - 0.5) * 36028797018963968.0); /* +-2^54 */
         }
-        const bool passes = spike_filter_passes(&s_gate, (uint64_t)i * 20000 + (uint64_t)(unit() * 19000), 20000, sample);
+        const bool passes = spike_filter_passes(&s_gate, (uint64_t)i * 20000 + (uint64_t)(random_unit() * 19000), 20000, sample);
         TEST_ASSERT_TRUE(passes || did_pass);
         withheld += !passes;
         did_pass = passes;

@@ -3,6 +3,7 @@
  * Signals and arrivals are made here in double precision from fixed seeds; what is measured is the reference itself.
  */
 #include "heave/stream.h"
+#include "random.h"
 #include "unity.h"
 
 #include <math.h>
@@ -17,7 +18,6 @@
 #define SINES    8
 
 static stream_t s_stream;
-static uint64_t s_random;
 
 void hv_assert_failed(const char *file, int line)
 {
@@ -27,21 +27,13 @@ void hv_assert_failed(const char *file, int line)
 
 void setUp(void)
 {
-    s_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
     stream_init(&s_stream, CYCLE_US, 1, STREAM_SMOOTH);
 }
 
 void tearDown(void) {}
 
 /* ---- signals ---- */
-
-static double random_unit(void)
-{
-    s_random ^= s_random << 13;
-    s_random ^= s_random >> 7;
-    s_random ^= s_random << 17;
-    return (double)(s_random >> 11) / 9007199254740992.0;
-}
 
 static q32_t q32(double value)
 {
@@ -60,7 +52,7 @@ static struct {
 
 static void make_signal(unsigned seed)
 {
-    s_random = 88172645463325252u + seed * 7919u;
+    random_begin(RANDOM_SEED + seed * 7919u);
     for (int i = 0; i < 20; i++) {
         random_unit();
     }

@@ -8,11 +8,11 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "random.h"
 #include "unity.h"
 
 static supervisor_t m_sup;
 static supervisor_view_t m_view;
-static uint32_t m_random;
 
 static jmp_buf m_assert_jump;
 static bool m_is_assert_expected;
@@ -30,7 +30,7 @@ void setUp(void)
 {
     supervisor_init(&m_sup);
     m_view = (supervisor_view_t){.is_at_rest = true};
-    m_random = 12345;
+    random_begin(RANDOM_SEED);
     m_is_assert_expected = false;
 }
 
@@ -531,14 +531,6 @@ static void test_supervisor_response_leads_down_and_lacks_nothing(void)
 }
 
 /* ---- random walks ---- */
-
-static uint32_t random_below(uint32_t n)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 17;
-    m_random ^= m_random << 5;
-    return m_random % n;
-}
 
 /* Who may be up: a model of one bit, set by an ENGAGE that was taken, taken back by all that means down. */
 static bool consent_after(bool consent, event_t event, const supervisor_t *after, bool was_ignored)

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "random.h"
 #include "rig.h"
 #include "unity.h"
 
@@ -15,24 +16,15 @@
 static rig_t m_rig;
 static rig_t m_ready; /* following, at neutral, nothing moving */
 static bool m_is_ready;
-static uint64_t m_random;
 static double m_z[LONGEST_MS + 1]; /* after each ms */
 
 static const unsigned k_times_ms[] = {10, 16, 20, 33, 40, 50, 100, 150, 200, 300, 400, 500};
 enum { TIMES = sizeof k_times_ms / sizeof k_times_ms[0] };
 
-static double unit(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return (double)(m_random >> 11) / 9007199254740992.0;
-}
-
 void setUp(void)
 {
     const settings_t settings = rig_hexapod();
-    m_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
     if (!m_is_ready) {
         rig_start(&m_rig, &settings, true);
         m_rig.is_auto_checking = true;
@@ -112,7 +104,8 @@ static unsigned run(const timed_sender_t *s)
             }
             frame++;
             before = at;
-            at = s->phase_ms + frame * s->period_ms + s->jitter_ms * unit() + (frame == s->late ? s->lateness * s->period_ms : 0);
+            at = s->phase_ms + frame * s->period_ms + s->jitter_ms * random_unit() +
+                 (frame == s->late ? s->lateness * s->period_ms : 0);
             at = at > before ? at : before;
         }
         rig_run_ms(&m_rig, 1);
@@ -152,7 +145,7 @@ static void test_ramp_constant_rate_keeps_its_speed_from_when_it_is_reached(void
             for (unsigned k = 0; k < 6; k++) {
                 timed_sender_t s = sender(k_times_ms[i]);
                 s.jitter_ms = jitter;
-                s.phase_ms = unit() * s.time_ms;
+                s.phase_ms = random_unit() * s.time_ms;
                 const unsigned total = run(&s);
                 const unsigned reached = first_at_share(&s, 0.9, total);
                 TEST_ASSERT_TRUE(reached < 5 * s.time_ms + 200);
@@ -217,10 +210,10 @@ static void test_ramp_late_and_lost_frames_do_not_stop_it(void)
 static void test_ramp_begins_without_a_dip_however_late_its_first_frames_are(void)
 {
     for (unsigned i = 0; i < 200; i++) {
-        timed_sender_t s = sender(60 + (unsigned)(unit() * 440));
-        s.phase_ms = unit() * s.time_ms;
+        timed_sender_t s = sender(60 + (unsigned)(random_unit() * 440));
+        s.phase_ms = random_unit() * s.time_ms;
         s.late = i % 2;
-        s.lateness = unit() * 0.5;
+        s.lateness = random_unit() * 0.5;
         const unsigned total = run(&s);
         const unsigned reached = first_at_share(&s, 0.9, total);
         double fastest = 0;
@@ -239,11 +232,11 @@ static void test_ramp_begins_somewhere_else_within_limits(void)
 {
     for (unsigned i = 0; i < 60; i++) {
         const unsigned time_ms = k_times_ms[i % TIMES];
-        const double from = 40 * unit() - 20;
+        const double from = 40 * random_unit() - 20;
         m_rig = m_ready;
         for (unsigned k = 0; k < 12; k++) {
             rig_sendf(&m_rig, "@A6T:%.3f,0,0,0,0,%.3f,%u#", from / 4, from + 6.0 * k * time_ms / 1000, time_ms);
-            rig_run_ms(&m_rig, time_ms + (unsigned)(unit() * 5));
+            rig_run_ms(&m_rig, time_ms + (unsigned)(random_unit() * 5));
         }
         rig_run_ms(&m_rig, 1000 + 30 * time_ms);
         TEST_ASSERT_TRUE(is_resting());
@@ -280,8 +273,8 @@ static void check_arrives_after(unsigned ms, double z)
 static void test_isolated_timed_frame_arrives_at_its_time(void)
 {
     for (unsigned i = 0; i < 40; i++) {
-        const unsigned ms = 300 + (unsigned)(unit() * 250);
-        const double z = 4 + 6 * unit();
+        const unsigned ms = 300 + (unsigned)(random_unit() * 250);
+        const double z = 4 + 6 * random_unit();
         m_rig = m_ready;
         rig_sendf(&m_rig, "@A6T:0,0,0,0,0,%.4f,%u#", z, ms);
         check_arrives_after(ms, z);

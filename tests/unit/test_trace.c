@@ -9,24 +9,15 @@
 
 #include "common/decimal.h"
 #include "heave/motion.h"
+#include "random.h"
 #include "unity.h"
-
-static uint64_t m_random;
 
 void setUp(void)
 {
-    m_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void) {}
-
-static uint64_t next_random(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return m_random;
-}
 
 /* Half away from zero: the C library rounds the exact value half to even, so exact ties are pushed outwards first. */
 static void expect_q32(q32_t value_q32, unsigned places)
@@ -67,7 +58,7 @@ static void test_decimal_put_q32_random_values_agree_with_long_double(void)
     TEST_IGNORE_MESSAGE("long double is too short here to be exact");
 #endif
     for (unsigned i = 0; i < 300000; i++) {
-        const uint64_t bits = next_random();
+        const uint64_t bits = random_bits();
         expect_q32((q32_t)bits >> (i % 60), i % 9 + 1);
         expect_q32((q32_t)(bits << 23 >> (i % 3 * 8)), 9); /* few bits: many exact ties at fewer places */
     }
@@ -86,7 +77,7 @@ static void test_decimal_put_ms_random_values_agree(void)
 {
     for (unsigned i = 0; i < 10000; i++) {
         char expected[64], got[64];
-        const uint64_t us = next_random() >> (i % 64);
+        const uint64_t us = random_bits() >> (i % 64);
         got[decimal_put_ms(got, us)] = '\0';
         snprintf(expected, sizeof expected, "%llu.%03llu", (unsigned long long)(us / 1000), (unsigned long long)(us % 1000));
         TEST_ASSERT_EQUAL_STRING(expected, got);

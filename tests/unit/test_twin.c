@@ -11,6 +11,7 @@
 #include "platform/startup_denied.h"
 #include "heave/status.h"
 #include "linux_can_local.h"
+#include "random.h"
 #include "twin/twin_options.h"
 #include "twin/wire.h"
 #include "unity.h"
@@ -719,16 +720,6 @@ static void test_local_bus_is_a_can_bus_with_echoes_and_faults(void)
 
 #define LIST_ITEMS 100000u
 
-static uint32_t m_random = 2463534242u;
-
-static uint32_t next_random(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 17;
-    m_random ^= m_random << 5;
-    return m_random;
-}
-
 static bool is_without_torque(void)
 {
     for (unsigned k = 0; k < m_twin.drives; k++) {
@@ -742,7 +733,7 @@ static bool is_without_torque(void)
 static uint32_t some_value(void)
 {
     static const uint32_t k_values[] = {0, 1, 2, 6, 7, 8, 15, 0x1F, 0x80, 0x8F, 0xFFFFFFFF, 0x80000000};
-    return next_random() % 4u == 0 ? next_random() : k_values[next_random() % (sizeof k_values / sizeof k_values[0])];
+    return random_below(4u) == 0 ? random_below(UINT32_MAX) : k_values[random_below(sizeof k_values / sizeof k_values[0])];
 }
 
 /* Whatever a list writes that --check lets through, in whatever order, before NMT start and after it: no drive leaves the state
@@ -752,7 +743,7 @@ static void test_no_startup_list_gives_torque(void)
     const objects_t *objects = &m_twin.node[2].drive.od;
     unsigned written = 0;
     for (unsigned i = 0; i < LIST_ITEMS; i++) {
-        const object_t *object = &objects->row[next_random() % objects->count];
+        const object_t *object = &objects->row[random_below(objects->count)];
         const uint32_t value = some_value();
         if (i == LIST_ITEMS / 2) {
             operational();

@@ -10,6 +10,7 @@
 
 #include "config/config.h"
 #include "platform/load.h"
+#include "random.h"
 #include "unity.h"
 
 #define LSB 4294967296.0
@@ -20,23 +21,13 @@ enum { PLATFORMS = sizeof k_platforms / sizeof k_platforms[0] };
 
 static config_t m_config;
 static motion_t m_motion;
-static uint64_t m_random;
 
 void setUp(void)
 {
-    m_random = 88172645463325252u;
+    random_begin(RANDOM_SEED);
 }
 
 void tearDown(void) {}
-
-/* From -1 to 1. */
-static double random_unit(void)
-{
-    m_random ^= m_random << 13;
-    m_random ^= m_random >> 7;
-    m_random ^= m_random << 17;
-    return (double)(m_random >> 11) / 4503599627370496.0 - 1;
-}
 
 static void load(unsigned platform)
 {
@@ -54,7 +45,7 @@ static pose_t random_pose(void)
         const ramp_limits_t *limits = &m_motion.platform.axis[i].limits;
         const double middle = (double)(limits->pos_min_q32 / 2 + limits->pos_max_q32 / 2);
         const double half = (double)(limits->pos_max_q32 / 2 - limits->pos_min_q32 / 2);
-        pose.axis_q32[i] = m_motion.platform.is_axis_moved[i] ? (q32_t)(middle + half * random_unit()) : 0;
+        pose.axis_q32[i] = m_motion.platform.is_axis_moved[i] ? (q32_t)(middle + half * random_between(-1, 1)) : 0;
     }
     return pose;
 }
