@@ -1185,6 +1185,12 @@ static void test_send_lag_beyond_the_window_is_a_fault_unless_it_is_not_watched(
         TEST_ASSERT_TRUE(i != 0 || strcmp("heaved found its set-point too far from its position, and has not sent it",
                                           report(2).trouble) == 0);
         TEST_ASSERT_INT_WITHIN(1000, i == 0 ? 10000 : 15000, twin.drive[2].last_target - 102000);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+        await(DRIVE_DISABLED, 200);
+        canopen_drives_fault(&twin, 2, 0x3210); /* another one, of the drive itself */
+        (void)cycles_until(2, DRIVE_FAULT, 3 * PERIOD);
+        TEST_ASSERT_FALSE(drive_guard_is_found(&feedback[2].guard));
     }
 }
 
