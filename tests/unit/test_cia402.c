@@ -712,6 +712,18 @@ static void test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_
     TEST_ASSERT_EQUAL_STRING("", report(5).detail);
 }
 
+/* It says that it is operational with its next heartbeat, which may take a while. */
+static void test_setup_drive_whose_heartbeats_are_rare_is_waited_for(void)
+{
+    config.heartbeat_ms = 900;
+    config.heartbeat_timeout_ms = 2700;
+    start();
+    await(DRIVE_DISABLED, 10000);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(1, twin.drive[k].boots);
+    }
+}
+
 /* Mapping is refused by an operational drive: it is told until its heartbeat says pre-operational. */
 static void test_setup_drive_that_goes_operational_by_itself_is_told_again(void)
 {
@@ -2926,6 +2938,7 @@ int main(void)
     RUN_TEST(test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allowed);
     RUN_TEST(test_setup_without_heartbeats_is_refused);
     RUN_TEST(test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_its_tpdos);
+    RUN_TEST(test_setup_drive_whose_heartbeats_are_rare_is_waited_for);
     RUN_TEST(test_setup_drive_that_goes_operational_by_itself_is_told_again);
     RUN_TEST(test_setup_optional_objects_missing_is_no_trouble);
     RUN_TEST(test_setup_missing_drive_is_named_and_taken_when_it_comes);
