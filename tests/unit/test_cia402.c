@@ -1145,6 +1145,47 @@ static void test_enable_while_enabled_changes_nothing_but_brings_back_who_fell_o
     }
 }
 
+/* One that waits for the others with its torque, and loses it. */
+static void test_enable_drive_that_loses_its_torque_meanwhile_does_not_get_it_again(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        setUp();
+        const unsigned other = (k + 1) % AXES;
+        twin.drive[other].is_stuck = true;
+        twin.drive[other].stuck_at = TWIN_ON;
+        come_up();
+        follow_actual();
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+        cycles(100);
+        TEST_ASSERT_EQUAL(TWIN_ENABLED, twin.drive[k].node.drive.state);
+        canopen_drives_drop(&twin, k);
+        (void)cycles_until(k, DRIVE_FAULT, 3 * PERIOD);
+        TEST_ASSERT_EQUAL_HEX32(CIA402_FELL_OUT, feedback[k].fault_code);
+        cycles(500);
+        TEST_ASSERT_EQUAL_UINT32(1, twin.drive[k].node.drive.enabled);
+    }
+}
+
+/* Set-points begin at where a drive is, however far that is from where the last ones ended. */
+static void test_enable_again_where_drives_were_moved_to(void)
+{
+    come_up();
+    enable();
+    cycles(100);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    cycles(100);
+    for (unsigned k = 0; k < AXES; k++) {
+        canopen_drives_place(&twin, k, 150000 + 1000 * (int32_t)k);
+    }
+    cycles(3 * PERIOD);
+    enable();
+    cycles(100);
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_INT32(0, twin.drive[k].largest_step);
+    }
+}
+
 static void test_send_set_points_arrive_as_counts_one_set_per_period(void)
 {
     come_up();
@@ -2965,6 +3006,8 @@ int main(void)
     RUN_TEST(test_enable_drive_that_shows_another_mode_gets_no_set_point);
     RUN_TEST(test_enable_drive_that_takes_no_mode_stops_all);
     RUN_TEST(test_enable_while_enabled_changes_nothing_but_brings_back_who_fell_out);
+    RUN_TEST(test_enable_drive_that_loses_its_torque_meanwhile_does_not_get_it_again);
+    RUN_TEST(test_enable_again_where_drives_were_moved_to);
     RUN_TEST(test_send_set_points_arrive_as_counts_one_set_per_period);
     RUN_TEST(test_send_position_wraps_round_without_a_jump);
     RUN_TEST(test_send_lag_beyond_the_window_is_a_fault_unless_it_is_not_watched);
