@@ -13,6 +13,11 @@ static uint32_t all_of(const cycle_t *cycle)
     return (1u << cycle->feedback.count) - 1u;
 }
 
+static bool has_one_by_one(const cycle_t *cycle)
+{
+    return cycle->drives.ops->request_one != NULL;
+}
+
 static unsigned motion_axis(const cycle_t *cycle, unsigned i)
 {
     return i < cycle->cylinders ? i : (unsigned)AXIS_ANGLE;
@@ -110,7 +115,7 @@ static bool step_up(service_t *self, const cycle_t *cycle, unsigned i)
     if (state == DRIVE_ENABLED && cycle->feedback.drive[i].has_actual) {
         self->up |= 1u << i;
         place(cycle, i);
-    } else if (state == DRIVE_DISABLED && ((self->off_due | self->stop_due) >> i & 1u) == 0) {
+    } else if (state == DRIVE_DISABLED) { /* what is to be switched off, or stopped, is not wanted */
         (void)!ask(cycle, i, DRIVES_ENABLE);
     }
     return cycle->now_us < self->deadline_us[i];
@@ -213,9 +218,12 @@ static uint32_t named(const cycle_t *cycle, uint8_t axis)
     return axis == SERVICE_ALL ? all_of(cycle) : axis <= cycle->feedback.count ? 1u << (axis - 1u) : 0;
 }
 
-static bool has_one_by_one(const cycle_t *cycle)
+/* Of what is begun, and of nothing that is on its way already. */
+static void set_deadlines(service_t *self, const cycle_t *cycle, uint32_t axes, uint64_t after_us)
 {
-    return cycle->drives.ops->request_one != NULL;
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        self->deadline_us[i] = (axes >> i & 1u) != 0 ? cycle->now_us + after_us : self->deadline_us[i];
+    }
 }
 
 static service_answer_t switch_torque(service_t *self, const cycle_t *cycle, uint32_t axes, bool is_on)
@@ -237,9 +245,7 @@ static service_answer_t switch_torque(service_t *self, const cycle_t *cycle, uin
     if (self->doing != SERVICE_NOTHING || !motion_is_at_rest(cycle->motion) || (self->stop_due & axes) != 0) {
         return SERVICE_BUSY;
     }
-    for (unsigned i = 0; i < cycle->feedback.count; i++) {
-        self->deadline_us[i] = (axes >> i & 1u) != 0 ? cycle->now_us + UP_TIMEOUT_US : self->deadline_us[i];
-    }
+    set_deadlines(self, cycle, axes, UP_TIMEOUT_US);
     if (!has_one_by_one(cycle) && drives_request(cycle->drives, DRIVES_ENABLE) != HV_OK) {
         return SERVICE_NOT_TAKEN;
     }
@@ -344,9 +350,7 @@ static service_answer_t home(service_t *self, const cycle_t *cycle, const servic
         return SERVICE_NOT_TAKEN;
     }
     self->homing = axes;
-    for (unsigned i = 0; i < cycle->feedback.count; i++) {
-        self->deadline_us[i] = cycle->now_us + HOME_TIMEOUT_US;
-    }
+    set_deadlines(self, cycle, all_of(cycle), HOME_TIMEOUT_US);
     return SERVICE_DONE;
 }
 
@@ -357,28 +361,19 @@ static service_answer_t judge_relay(const cycle_t *cycle, uint8_t relay)
                                                               : SERVICE_DONE;
 }
 
+/* One of the requests that are held. */
 static service_answer_t start(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
-    switch (request->verb) {
-    case SERVICE_JOG_AXIS:
+    if (request->verb == SERVICE_JOG_AXIS) {
         return jog_axis(self, cycle, request);
-    case SERVICE_JOG_POSE:
-        return jog_pose(self, cycle, request);
-    case SERVICE_HOME:
-        return home(self, cycle, request);
-    case SERVICE_RELAY:
-        return judge_relay(cycle, request->axis);
-    case SERVICE_SIGNAL_AXIS:
-    case SERVICE_SIGNAL_POSE:
-        return excite(self, cycle, request);
-    case SERVICE_NOTHING:
-    case SERVICE_TORQUE_ON:
-    case SERVICE_TORQUE_OFF:
-    case SERVICE_BEAT:
-    case SERVICE_RELEASE:
-        break;
     }
-    return SERVICE_NO_SUCH;
+    if (request->verb == SERVICE_JOG_POSE) {
+        return jog_pose(self, cycle, request);
+    }
+    if (request->verb == SERVICE_HOME) {
+        return home(self, cycle, request);
+    }
+    return request->verb == SERVICE_RELAY ? judge_relay(cycle, request->axis) : excite(self, cycle, request);
 }
 
 static service_answer_t answer_of_hand(deadman_answer_t answer)
@@ -422,10 +417,14 @@ static service_answer_t release(service_t *self, motion_t *motion, uint32_t seri
 
 service_answer_t service_request(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
-    if (service_is_held(request->verb)) {
-        return hold(self, cycle, request);
-    }
     switch (request->verb) {
+    case SERVICE_JOG_AXIS:
+    case SERVICE_JOG_POSE:
+    case SERVICE_HOME:
+    case SERVICE_RELAY:
+    case SERVICE_SIGNAL_AXIS:
+    case SERVICE_SIGNAL_POSE:
+        return hold(self, cycle, request);
     case SERVICE_TORQUE_ON:
     case SERVICE_TORQUE_OFF:
         return switch_torque(self, cycle, named(cycle, request->axis), request->verb == SERVICE_TORQUE_ON);
@@ -435,12 +434,6 @@ service_answer_t service_request(service_t *self, const cycle_t *cycle, const se
     case SERVICE_RELEASE:
         return release(self, cycle->motion, request->series);
     case SERVICE_NOTHING:
-    case SERVICE_JOG_AXIS:
-    case SERVICE_JOG_POSE:
-    case SERVICE_HOME:
-    case SERVICE_RELAY:
-    case SERVICE_SIGNAL_AXIS:
-    case SERVICE_SIGNAL_POSE:
         break;
     }
     return SERVICE_NO_SUCH;
