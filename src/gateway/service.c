@@ -101,6 +101,17 @@ static uint32_t ask_due(const cycle_t *cycle, uint32_t due, drives_request_t req
     return due;
 }
 
+/* Where the bus knows all drives together only, none is stopped alone: all of them are, and none has torque then. */
+static void step_stop(service_t *self, const cycle_t *cycle)
+{
+    if (self->stop_due != 0 && !has_one_by_one(cycle)) {
+        self->stop_due = all_of(cycle);
+        self->wanted = 0;
+        self->up = 0;
+    }
+    self->stop_due = ask_due(cycle, self->stop_due, DRIVES_QUICK_STOP);
+}
+
 /* The axis is where its drive is. */
 static void place(const cycle_t *cycle, unsigned i)
 {
@@ -169,7 +180,7 @@ fault_code_t service_step(service_t *self, const cycle_t *cycle)
     if (self->doing != SERVICE_NOTHING && !deadman_step(&self->hand, hand_us(self, cycle))) {
         service_let_go(self, cycle->motion);
     }
-    self->stop_due = ask_due(cycle, self->stop_due, DRIVES_QUICK_STOP);
+    step_stop(self, cycle);
     if (self->off_due != 0 && motion_is_at_rest(cycle->motion)) {
         self->up &= ~self->off_due;
         self->off_due = ask_due(cycle, self->off_due, DRIVES_DISABLE);

@@ -179,6 +179,31 @@ static void test_together_torque_and_zeros_are_those_of_all(void)
     TEST_ASSERT_EQUAL(0, rig_following_errors(&m_rig));
 }
 
+/* Those that have found their zero stop with the others: a stop of those alone the bus does not know, and without one they would
+ * go on with no hand there. */
+static void test_together_homing_without_a_hand_stops_when_some_have_their_zero(void)
+{
+    start(false, false);
+    m_rig.drives.axis[1].position_q32 = 0;
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_TORQUE_ON, SERVICE_ALL, 0));
+    rig_run_ms(&m_rig, 200);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_HOME, SERVICE_ALL, 0));
+    hold_ms(100);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, m_rig.drives.axis[1].state);
+    TEST_ASSERT_EQUAL(DRIVE_HOMING, m_rig.drives.axis[2].state);
+    TEST_ASSERT_EQUAL_HEX32(ALL & ~0x42u, seen()->service.homing);
+    rig_run_ms(&m_rig, 260);
+    TEST_ASSERT_EQUAL(1, m_asked[DRIVES_QUICK_STOP]);
+    for (unsigned i = 0; i < m_rig.drives.count; i++) {
+        TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[i].state);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, seen()->service.torque);
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_FALSE(m_rig.drives.axis[2].is_homed);
+    TEST_ASSERT_EQUAL(STATE_SERVICE, seen()->state);
+}
+
 static void test_together_torque_that_the_bus_does_not_accept_is_told_and_not_waited_for(void)
 {
     static const hv_status_t k_refusals[] = {HV_ERR_AGAIN, HV_ERR_STATE, HV_ERR_IO};
@@ -478,6 +503,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_together_one_drive_is_refused_by_name_and_nothing_is_asked);
     RUN_TEST(test_together_torque_and_zeros_are_those_of_all);
+    RUN_TEST(test_together_homing_without_a_hand_stops_when_some_have_their_zero);
     RUN_TEST(test_together_torque_that_the_bus_does_not_accept_is_told_and_not_waited_for);
     RUN_TEST(test_torque_off_of_one_drive_is_asked_until_the_bus_accepts_it);
     RUN_TEST(test_stop_of_homing_is_asked_until_the_bus_accepts_it);
