@@ -361,7 +361,7 @@ static service_answer_t home(service_t *self, const cycle_t *cycle, const servic
         return SERVICE_NOT_TAKEN;
     }
     self->homing = axes;
-    set_deadlines(self, cycle, all_of(cycle), HOME_TIMEOUT_US);
+    set_deadlines(self, cycle, axes, HOME_TIMEOUT_US);
     return SERVICE_DONE;
 }
 
