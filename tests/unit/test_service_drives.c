@@ -377,6 +377,30 @@ static void test_signal_needs_the_zeros_of_what_it_moves(void)
     assert_well();
 }
 
+/* Strokes so long that not all extensions belong to a pose: these do not. The cylinders can be moved one by one all the same. */
+static void test_pose_that_the_extensions_do_not_have_is_told(void)
+{
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        m_settings.geometry.retracted_mm_q16[i] = Q(650);
+        m_settings.stroke_mm_q16[i] = Q(1200);
+    }
+    start(false, true);
+    for (unsigned i = 0; i < m_rig.drives.count; i++) {
+        m_rig.drives.axis[i].is_homed = true;
+        m_rig.drives.axis[i].position_q32 = q32_from_int(i % 2 == 0 ? 1195 : 5);
+    }
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_TORQUE_ON, SERVICE_ALL, 0));
+    rig_run_ms(&m_rig, 200);
+    TEST_ASSERT_EQUAL(SERVICE_NO_POSE, ask(SERVICE_JOG_POSE, AXIS_Z + 1, 5));
+    TEST_ASSERT_EQUAL(SERVICE_NO_POSE, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_AXIS, 1, -20));
+    hold_ms(2000);
+    TEST_ASSERT_TRUE(setpoint(1) < 1195 - 30);
+    TEST_ASSERT_EQUAL(STATE_SERVICE, seen()->state);
+    TEST_ASSERT_EQUAL(0, rig_following_errors(&m_rig));
+}
+
 /* The hand is off, and the platform has not come to rest yet: what it held last still stops. */
 static void test_nothing_begins_before_a_stop_has_ended(void)
 {
@@ -514,6 +538,7 @@ int main(void)
     RUN_TEST(test_torque_that_does_not_come_is_a_fault_beside_drives_in_time);
     RUN_TEST(test_what_is_not_there_is_refused_by_name);
     RUN_TEST(test_signal_needs_the_zeros_of_what_it_moves);
+    RUN_TEST(test_pose_that_the_extensions_do_not_have_is_told);
     RUN_TEST(test_nothing_begins_before_a_stop_has_ended);
     RUN_TEST(test_torque_off_leaves_a_relay_held);
     RUN_TEST(test_release_of_another_press_stops_nothing);
