@@ -52,13 +52,13 @@ bool assembly_is_held(const platform_t *self, bool is_beginning, const q32_t ext
     return is_held_near(self, extension_mm_q32, &self->pose) || is_held_near(self, extension_mm_q32, &self->neutral);
 }
 
-bool assembly_can_stop(const platform_t *self)
+bool assembly_can_stop(const platform_t *self, const ramp_t *const by[CYLINDERS_MAX])
 {
     ramp_state_t start[CYLINDERS_MAX];
     const ramp_limits_t *limits[CYLINDERS_MAX];
     q32_t rest_q32[CYLINDERS_MAX];
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        const ramp_t *ramp = &self->cylinder[i]; /* the coming cycle may still push on with all its jerk */
+        const ramp_t *ramp = by[i]; /* the coming cycle may still push on with all its jerk */
         const ramp_state_t *now = &ramp->state;
         const q32_t jerk_q32 = ramp->limits.jerk_per_cycle3_q32;
         const q32_t pushed_q32 = now->acc_per_cycle2_q32 + (now->vel_per_cycle_q32 < 0 ? -jerk_q32 : jerk_q32);

@@ -14,7 +14,7 @@ bool assembly_is_held(const platform_t *self, bool is_beginning, const q32_t ext
 
 /** Whether a stop begun a cycle from now would end in such an assembly, or in a better one than this where this is none already.
  *  On the way between two targets nothing else asks: cylinders that go straight in their own space may lead the plate anywhere.
- */
-bool assembly_can_stop(const platform_t *self);
+ *  @param by what limits each cylinder now, and in its stop */
+bool assembly_can_stop(const platform_t *self, const ramp_t *const by[CYLINDERS_MAX]);
 
 #endif

@@ -257,12 +257,21 @@ unsigned jog_limit(jog_t *self, platform_t *platform, unsigned axis, const ramp_
     return ramp->flags;
 }
 
+bool jog_can_stop(const jog_t *self, const platform_t *platform)
+{
+    const ramp_t *by[CYLINDERS_MAX];
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        by[i] = jog_limiter(self, platform, i);
+    }
+    return assembly_can_stop(platform, by);
+}
+
 /* Where no pose is known, as before homing, there is nothing to go by. */
 bool jog_is_near_singularity(const jog_t *self, const platform_t *platform)
 {
     const uint32_t cylinders = (1u << CYLINDERS_MAX) - 1u;
     return !self->is_posed && (self->moved & cylinders) != 0 && !platform->is_pose_stale && !platform_is_at_rest(platform) &&
-           !assembly_can_stop(platform);
+           !jog_can_stop(self, platform);
 }
 
 bool jog_is_done(const jog_t *self, const straight_t *line)

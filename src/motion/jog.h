@@ -47,6 +47,10 @@ void jog_step(jog_t *self, const platform_t *platform, straight_t *line, ramp_re
  *  @return the flags of the limiter */
 unsigned jog_limit(jog_t *self, platform_t *platform, unsigned axis, const ramp_ref_t *ref, bool is_ended);
 
+/** assembly_can_stop() by what limits the cylinders now: what a jog moves stops by the limits of a jog, which are lower than
+ * those of a ride. */
+bool jog_can_stop(const jog_t *self, const platform_t *platform);
+
 /** True where a jog has to stop: extensions moved one by one come to where the cylinders would not hold the plate. */
 bool jog_is_near_singularity(const jog_t *self, const platform_t *platform);
 

@@ -16,7 +16,6 @@
  */
 #include "heave/motion.h"
 
-#include "assembly.h"
 #include "axis_targets.h"
 #include "fade_in.h"
 #include "follow.h"
@@ -168,7 +167,7 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
 static bool is_near_singularity(const motion_t *self)
 {
     return follow_is_moving(self) && self->followed.space == MOTION_CYLINDERS && platform_are_cylinders_moving(&self->platform) &&
-           !assembly_can_stop(&self->platform);
+           !jog_can_stop(&self->jog, &self->platform);
 }
 
 /* Changes of source that become due at the end of a cycle. */

@@ -392,6 +392,31 @@ static void test_jog_of_a_pose_ends_before_a_singularity(void)
     TEST_ASSERT_EQUAL_UINT32(0, motion_singular_stops(&m_motion)); /* it was known before it began */
 }
 
+/* One cylinder after the other: each of them has its way, and where they lead together is seen on it. */
+static void test_jog_of_a_cylinder_stops_before_a_singularity(void)
+{
+    static const double k_at[] = {260, 600, 891};
+    m_settings = rig_tripod();
+    for (unsigned i = 0; i < 3; i++) {
+        m_settings.geometry.retracted_mm_q16[i] = Q(260);
+        m_settings.stroke_mm_q16[i] = Q(1000);
+    }
+    m_settings.jog_mm_s_q16 = Q(50); /* its stop takes 6 mm, that of a ride less than 1 */
+    serve_at(k_at);
+    TEST_ASSERT_BITS_LOW(MOTION_NO_POSE, m_out.flags);
+    TEST_ASSERT_TRUE(kin_margin(motion_kin(&m_motion), motion_pose(&m_motion)) >= KIN_MARGIN_LEAST_Q32);
+    TEST_ASSERT_EQUAL(HV_OK, jog_axis(0, -50));
+    run_ms(9000);
+    TEST_ASSERT_EQUAL_UINT32(1, motion_singular_stops(&m_motion));
+    TEST_ASSERT_TRUE(motion_is_at_rest(&m_motion));
+    TEST_ASSERT_TRUE(at(1) > 6);
+    TEST_ASSERT_TRUE(kin_margin(motion_kin(&m_motion), motion_pose(&m_motion)) >= KIN_MARGIN_LEAST_Q32 * 99 / 100);
+    TEST_ASSERT_EQUAL(HV_OK, jog_axis(0, 50)); /* and there is a way back */
+    run_ms(1000);
+    TEST_ASSERT_EQUAL_UINT32(1, motion_singular_stops(&m_motion));
+    TEST_ASSERT_TRUE(m_fastest > 45);
+}
+
 /* ---- by hand ---- */
 
 /* No pose on a line that was looked at is out of reach. Were one, the cylinders would not leave for it. */
@@ -454,6 +479,7 @@ int main(void)
     RUN_TEST(test_signal_that_no_pose_has_is_refused);
     RUN_TEST(test_steps_that_do_not_fit_into_their_time_are_refused);
     RUN_TEST(test_jog_of_a_pose_ends_before_a_singularity);
+    RUN_TEST(test_jog_of_a_cylinder_stops_before_a_singularity);
     RUN_TEST(test_cylinders_stay_where_a_line_has_no_pose);
     RUN_TEST(test_cylinder_that_is_pushed_after_its_stop_comes_to_rest);
     return UNITY_END();
