@@ -65,15 +65,15 @@ static bool is_config_valid(const cia402_config_t *config)
     if (config->axes < 1 || config->axes > DRIVES_MAX || config->master_node < 1 || config->master_node > CIA402_NODE_MAX) {
         return false;
     }
-    if (!are_times_valid(config) || !are_rates_valid(config) || !are_modes_valid(config) || config->pdo_step > 64u ||
-        !cia402_pdos_fit(config, &why)) {
+    if (!are_times_valid(config) || !are_rates_valid(config) || !are_modes_valid(config) || config->pdo_step > 64u) {
         return false;
     }
-    bool are_valid = true;
     for (unsigned k = 0; k < config->axes; k++) {
-        are_valid = are_valid && is_axis_valid(config, k);
+        if (!is_axis_valid(config, k)) {
+            return false;
+        }
     }
-    return are_valid;
+    return cia402_pdos_fit(config, &why);
 }
 
 hv_status_t cia402_init(cia402_t *self, const cia402_config_t *config, hal_can_t can)
