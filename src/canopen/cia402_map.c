@@ -233,8 +233,25 @@ static unsigned count_entry(const cia402_config_t *config, unsigned axis, bool i
     return maps->count != 0 ? count : 1u;
 }
 
+/* Nothing behind the end of a list is looked at, and the fields of a PDO are counted by what follows. */
+static bool are_counted(const cia402_maps_t *maps)
+{
+    if (maps->count > CIA402_MAPS_MAX) {
+        return false;
+    }
+    for (unsigned i = 0; i < maps->count; i++) {
+        if (maps->map[i].entries > CIA402_PDO_ENTRIES) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static bool are_whole(const cia402_maps_t *maps)
 {
+    if (!are_counted(maps)) {
+        return false;
+    }
     for (unsigned i = 0; i < maps->count; i++) {
         unsigned bits = 0;
         for (unsigned n = 0; n < maps->map[i].entries; n++) {
@@ -248,7 +265,7 @@ static bool are_whole(const cia402_maps_t *maps)
             return false;
         }
     }
-    return maps->count <= CIA402_MAPS_MAX;
+    return true;
 }
 
 /* Numbers that differ, within the records of a channel where there are several. */

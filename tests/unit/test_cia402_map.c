@@ -145,6 +145,23 @@ static void test_pdo_number_that_cannot_be_does_not_fit(void)
     check_fits();
 }
 
+/* What stands behind the end of a list is never looked at. */
+static void test_more_than_a_list_holds_does_not_fit(void)
+{
+    fix();
+    m_config.commands.count = CIA402_MAPS_MAX + 1u;
+    check_fits_not("1 to 8 whole bytes");
+    fix();
+    m_config.answers.count = 255;
+    check_fits_not("1 to 8 whole bytes");
+    fix();
+    m_config.answers.map[1].entries = CIA402_PDO_ENTRIES + 1u;
+    for (unsigned n = 0; n < CIA402_PDO_ENTRIES; n++) {
+        m_config.answers.map[1].entry[n] = OWN_8;
+    }
+    check_fits_not("1 to 8 whole bytes");
+}
+
 static void test_controlword_and_statusword_are_needed_the_first_once(void)
 {
     fix();
@@ -339,6 +356,7 @@ int main(void)
     RUN_TEST(test_maps_that_fit_are_accepted);
     RUN_TEST(test_pdo_without_whole_bytes_or_of_too_many_does_not_fit);
     RUN_TEST(test_pdo_number_that_cannot_be_does_not_fit);
+    RUN_TEST(test_more_than_a_list_holds_does_not_fit);
     RUN_TEST(test_controlword_and_statusword_are_needed_the_first_once);
     RUN_TEST(test_node_has_four_identifiers_in_each_direction);
     RUN_TEST(test_pdos_of_a_channel_are_below_those_of_the_next);
