@@ -5,12 +5,11 @@
  */
 #include "heave/excitation.h"
 
-#define TWO_PI_Q60    7244019458077122842
-#define LN2_Q62       3196577161300663915
-#define MHZ_US        1000000000u /* 1 in 1/1000 Hz times us */
-#define SUBSTEPS      256         /* of the growth from one sine of noise to the next */
-#define NOISE_SEED    2463534242u
-#define TURN_MOST_Q64 ((int64_t)1 << 61) /* eight cycles for a period */
+#define TWO_PI_Q60 7244019458077122842
+#define LN2_Q62    3196577161300663915
+#define MHZ_US     1000000000u /* 1 in 1/1000 Hz times us */
+#define SUBSTEPS   256         /* of the growth from one sine of noise to the next */
+#define NOISE_SEED 2463534242u
 
 /* --- Frequencies --- */
 
@@ -138,11 +137,12 @@ static int64_t sweep_growth_q62(const excitation_request_t *request, uint32_t cy
     return growth_q62(request->from_mhz, request->to_mhz, sweep_cycles(request, cycle_us) / 8 * 7);
 }
 
-/* Where it grew faster, what it grows by would count beside what it swings by. */
+/* Where it grew faster, what it grows by would count beside what it swings by. Six periods of the lowest frequency, of eight
+ * cycles each at least, leave two of them between the ramps. */
 static bool is_slow_enough(const excitation_request_t *request, uint32_t cycle_us)
 {
     const int64_t w_q60 = fx_mul_shift(turn_of(request->from_mhz, cycle_us), TWO_PI_Q60, 64);
-    return sweep_cycles(request, cycle_us) >= 8 && sweep_growth_q62(request, cycle_us) / 4 <= w_q60 / 10;
+    return sweep_growth_q62(request, cycle_us) / 4 <= w_q60 / 10;
 }
 
 bool excitation_is_allowed(const excitation_request_t *request, uint32_t cycle_us)
@@ -207,7 +207,7 @@ hv_status_t excitation_init(excitation_t *self, const excitation_request_t *requ
         self->ramp_out = ramp_cycles(turn_of(request->to_mhz, cycle_us), cycle_us);
         self->growth_q62 = sweep_growth_q62(request, cycle_us);
     }
-    return self->share_q62[0] > 0 ? HV_OK : HV_ERR_RANGE;
+    return HV_OK; /* a share is above 0, whatever the limits: beyond_q40() is bounded */
 }
 
 /* --- The cycle --- */
@@ -231,16 +231,17 @@ static q62_t growing(const excitation_t *self)
     return nearest <= 0 ? 0 : 8 * nearest < sweep ? ramp(nearest, (sweep + 7) / 8) : Q62_ONE;
 }
 
+/* What grows by shares of itself ends below what it would grow to at once: the frequency never exceeds the highest of its band.
+ */
 HV_WRAPS static q62_t step_chirp(excitation_t *self)
 {
     self->phase_q64 += (uint64_t)self->turn_q64[0];
     const q62_t share_q62 = fx_mul_shift(sine(self->phase_q64), reach(&self->limits, self->turn_q64[0]), 62);
-    const int64_t next_q64 = grow(self->turn_q64[0], fx_mul_shift(self->growth_q62, growing(self), 62));
-    self->turn_q64[0] = next_q64 < TURN_MOST_Q64 ? next_q64 : TURN_MOST_Q64;
+    self->turn_q64[0] = grow(self->turn_q64[0], fx_mul_shift(self->growth_q62, growing(self), 62));
     return share_q62;
 }
 
-/* Out where there is time to come back, too. */
+/* Out where there is time to come back, too, as there is in the first cycle: begin_steps(). */
 static q62_t step_steps(excitation_t *self)
 {
     if ((self->elapsed - 1) % self->half == 0) {
@@ -251,9 +252,7 @@ static q62_t step_steps(excitation_t *self)
         self->is_out = is_next_out;
     }
     scurve_step(&self->way);
-    return scurve_cycles(&self->way) == 0 ? 0
-           : self->is_out                 ? scurve_between(&self->way, 0, Q62_ONE)
-                                          : scurve_between(&self->way, Q62_ONE, 0);
+    return self->is_out ? scurve_between(&self->way, 0, Q62_ONE) : scurve_between(&self->way, Q62_ONE, 0);
 }
 
 q62_t excitation_step(excitation_t *self)

@@ -224,6 +224,46 @@ static void test_what_makes_no_signal_is_refused(void)
 #undef REFUSED
     TEST_ASSERT_FALSE(excitation_is_allowed(&good, 10000)); /* 20 Hz of 10 ms: five cycles for a period */
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, excitation_init(&m_signal, &good, &nothing, 1000));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, excitation_init(&m_signal, &good, &(path_limits_t){Q62_ONE, 0, Q62_ONE}, 1000));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, excitation_init(&m_signal, &good, &(path_limits_t){Q62_ONE, Q62_ONE, 0}, 1000));
+}
+
+/* From 0.1 to 50 Hz there are nine octaves: 1.3 periods of 10 s each, and the ramps. */
+static void test_chirp_that_rises_too_quickly_is_refused(void)
+{
+    const excitation_request_t quick = wish(EXCITATION_CHIRP, 0.1, 50, 100);
+    const excitation_request_t slow = wish(EXCITATION_CHIRP, 0.1, 50, 160);
+    TEST_ASSERT_FALSE(excitation_is_allowed(&quick, 1000));
+    TEST_ASSERT_TRUE(excitation_is_allowed(&slow, 1000));
+}
+
+/* Where the band ends at eight cycles for a period nothing leads beyond. */
+static void test_chirp_to_the_highest_frequency_ends_there(void)
+{
+    const path_limits_t wide = path_limits_none();
+    for (unsigned seconds = 20; seconds < 60; seconds++) {
+        int64_t most = 0;
+        start(wish(EXCITATION_CHIRP, 1, 50, seconds), &wide, 2500);
+        while (!excitation_is_done(&m_signal)) {
+            const int64_t before = m_signal.turn_q64[0];
+            (void)excitation_step(&m_signal);
+            TEST_ASSERT_TRUE(m_signal.turn_q64[0] >= before);
+            most = m_signal.turn_q64[0] > most ? m_signal.turn_q64[0] : most;
+        }
+        TEST_ASSERT_TRUE(most <= (int64_t)1 << 61 && most > ((int64_t)1 << 61) / 100 * 99);
+    }
+}
+
+/* What is narrowest still moves: the least limits that a signal can have. */
+static void test_signal_of_the_least_limits_has_an_amplitude(void)
+{
+    const path_limits_t least = {1, 1, 1};
+    static const excitation_kind_t k_kinds[] = {EXCITATION_SINE, EXCITATION_NOISE, EXCITATION_CHIRP};
+    for (unsigned i = 0; i < 3; i++) {
+        start(wish(k_kinds[i], 2, k_kinds[i] == EXCITATION_SINE ? 0 : 50, 30), &least, 1000);
+        TEST_ASSERT_TRUE(m_signal.share_q62[0] > 0);
+        TEST_ASSERT_TRUE(m_signal.share_q62[0] < Q62_ONE / 1000000);
+    }
 }
 
 int main(void)
@@ -235,5 +275,8 @@ int main(void)
     RUN_TEST(test_steps_go_to_one_side_and_come_back);
     RUN_TEST(test_noise_is_the_same_each_time);
     RUN_TEST(test_what_makes_no_signal_is_refused);
+    RUN_TEST(test_chirp_that_rises_too_quickly_is_refused);
+    RUN_TEST(test_chirp_to_the_highest_frequency_ends_there);
+    RUN_TEST(test_signal_of_the_least_limits_has_an_amplitude);
     return UNITY_END();
 }
