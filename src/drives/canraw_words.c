@@ -37,9 +37,9 @@ static const char *text_of_strange(canraw_verdict_t verdict)
         return "its alive counter stands still";
     case CANRAW_MATCH:
     case CANRAW_OTHER:
-    default:
-        return "it sends other bytes than its replies in the configuration";
+        break;
     }
+    return "it sends other bytes than its replies in the configuration";
 }
 
 /* At the start there is time for the first frame. */
