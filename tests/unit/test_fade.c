@@ -141,6 +141,16 @@ static void test_takes_the_time_that_it_is_given(void)
     }
 }
 
+/* Cycles beyond what a share can be made of are as many as it can. */
+static void test_time_is_within_what_a_share_can_take(void)
+{
+    fade_t fade;
+    fade_begin(&fade, k_from, UINT32_MAX);
+    TEST_ASSERT_EQUAL_UINT32(FADE_CYCLES_MAX, fade.least_cycles);
+    fade_begin(&fade, k_from, 0);
+    TEST_ASSERT_EQUAL_UINT32(FADE_CYCLES_MIN, fade.least_cycles);
+}
+
 static void test_tells_how_long_a_plan_takes(void)
 {
     const fade_limits_t limits = limits_of(40, 100, 0.001);
@@ -172,6 +182,7 @@ int main(void)
     RUN_TEST(test_keeps_the_limits_and_is_as_quick_as_they_allow);
     RUN_TEST(test_ends_with_any_limits);
     RUN_TEST(test_takes_the_time_that_it_is_given);
+    RUN_TEST(test_time_is_within_what_a_share_can_take);
     RUN_TEST(test_tells_how_long_a_plan_takes);
     RUN_TEST(test_travel_that_grows_makes_it_slower_at_once);
     return UNITY_END();

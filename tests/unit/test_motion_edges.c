@@ -166,6 +166,48 @@ static void test_follow_a_pose_from_positions_without_one(void)
     TEST_ASSERT_TRUE(motion_is_at_rest(&m_motion));
 }
 
+/* What comes on the way there waits for its end; the last of it counts. */
+static void test_target_on_the_way_from_positions_without_a_pose_waits(void)
+{
+    motion_target_t target = {.space = MOTION_POSE, .value_q32 = {[AXIS_ROLL] = q32_from_int(3)}};
+    const motion_target_t from = start_askew();
+    motion_place(&m_motion, from.value_q32, 0);
+    step(0);
+    motion_follow(&m_motion);
+    step(0);
+    take(&target);
+    run_ms(100, 50);
+    TEST_ASSERT_EQUAL(MOTION_ON_PATH, m_motion.source);
+    target.value_q32[AXIS_ROLL] = q32_from_int(-4);
+    take(&target);
+    run_ms(100, 50);
+    TEST_ASSERT_EQUAL(MOTION_ON_PATH, m_motion.source);
+    run_ms(30000, 50.1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, -4, mm(m_out.sent.axis_q32[AXIS_ROLL]));
+}
+
+/* Cylinders that were thrown to where they have no pose while they were followed, and then a pose: no cylinder jumps, and the
+ * platform gets there. */
+static void test_pose_behind_extensions_that_lost_theirs_is_reached(void)
+{
+    const motion_target_t pose = {.space = MOTION_POSE, .value_q32 = {[AXIS_Z] = q32_from_int(10)}};
+    motion_target_t extensions = {.space = MOTION_CYLINDERS};
+    const motion_target_t askew = start_askew();
+    start_following();
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        extensions.value_q32[i] = m_motion.platform.neutral_mm_q32[i];
+    }
+    take(&extensions);
+    run_ms(3000, 400);
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        m_motion.platform.cylinder[i].state = (ramp_state_t){.pos_q32 = askew.value_q32[i]};
+    }
+    take(&pose);
+    run_ms(30000, 400.1);
+    TEST_ASSERT_TRUE(motion_is_at_rest(&m_motion));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10, mm(m_out.sent.axis_q32[AXIS_Z]));
+}
+
 /* What a tripod does not move changes nothing of what it moves, however far it is asked for. */
 static void test_axis_that_is_not_moved_is_told_and_left_out(void)
 {
@@ -387,6 +429,8 @@ int main(void)
     RUN_TEST(test_path_is_not_over_before_a_cylinder_thrown_off_is_back);
     RUN_TEST(test_target_that_intensity_makes_impossible_while_it_waits_is_dropped);
     RUN_TEST(test_follow_a_pose_from_positions_without_one);
+    RUN_TEST(test_target_on_the_way_from_positions_without_a_pose_waits);
+    RUN_TEST(test_pose_behind_extensions_that_lost_theirs_is_reached);
     RUN_TEST(test_axis_that_is_not_moved_is_told_and_left_out);
     RUN_TEST(test_timed_move_told_again_begins_anew_only_for_another_angle);
     RUN_TEST(test_take_over_that_was_led_beyond_the_limits_begins_anew);
