@@ -417,6 +417,48 @@ static void test_jog_of_a_cylinder_stops_before_a_singularity(void)
     TEST_ASSERT_TRUE(m_fastest > 45);
 }
 
+/* Nearer to one than is allowed, as torque may come on: a jog that leads away from it goes on. */
+static void check_leads_out_from(int from_mm)
+{
+    static const double k_far[] = {260, 600, 891};
+    m_settings = rig_tripod();
+    for (unsigned i = 0; i < 3; i++) {
+        m_settings.geometry.retracted_mm_q16[i] = Q(260);
+        m_settings.stroke_mm_q16[i] = Q(1000);
+    }
+    serve_at(k_far);
+    for (int to_mm = 259; to_mm >= from_mm; to_mm--) { /* turned there by hand: the pose is known all the way */
+        motion_place_axis(&m_motion, 0, q32(to_mm));
+        run_ms(1);
+    }
+    TEST_ASSERT_BITS_LOW(MOTION_NO_POSE, m_out.flags);
+    const q32_t margin_q32 = kin_margin(motion_kin(&m_motion), motion_pose(&m_motion));
+    TEST_ASSERT_TRUE(margin_q32 < KIN_MARGIN_LEAST_Q32);
+    for (uint32_t stops = 1; stops <= 20; stops++) { /* not further in, however slow and often it is tried */
+        TEST_ASSERT_EQUAL(HV_OK, stops % 3 == 0 ? jog_axis(2, 1) : jog_axis(0, stops % 3 == 1 ? -20 : -1));
+        run_ms(200);
+        TEST_ASSERT_EQUAL_UINT32(stops, motion_singular_stops(&m_motion));
+    }
+    TEST_ASSERT_TRUE(at(1) > from_mm - 0.1);
+    TEST_ASSERT_EQUAL(HV_OK, jog_axis(0, 1));
+    run_ms(1000);
+    TEST_ASSERT_EQUAL_UINT32(20, motion_singular_stops(&m_motion));
+    TEST_ASSERT_TRUE(at(1) > from_mm + 0.5);
+    motion_stop(&m_motion);
+    run_ms(200);
+    TEST_ASSERT_EQUAL(HV_OK, jog_axis(0, 20));
+    run_ms(1000);
+    TEST_ASSERT_EQUAL_UINT32(20, motion_singular_stops(&m_motion));
+    TEST_ASSERT_TRUE(at(1) > 145);
+    TEST_ASSERT_TRUE(kin_margin(motion_kin(&m_motion), motion_pose(&m_motion)) > margin_q32);
+}
+
+static void test_jog_of_a_cylinder_leads_out_of_a_singularity(void)
+{
+    check_leads_out_from(134);
+    check_leads_out_from(136);
+}
+
 /* ---- by hand ---- */
 
 /* No pose on a line that was looked at is out of reach. Were one, the cylinders would not leave for it. */
@@ -480,6 +522,7 @@ int main(void)
     RUN_TEST(test_steps_that_do_not_fit_into_their_time_are_refused);
     RUN_TEST(test_jog_of_a_pose_ends_before_a_singularity);
     RUN_TEST(test_jog_of_a_cylinder_stops_before_a_singularity);
+    RUN_TEST(test_jog_of_a_cylinder_leads_out_of_a_singularity);
     RUN_TEST(test_cylinders_stay_where_a_line_has_no_pose);
     RUN_TEST(test_cylinder_that_is_pushed_after_its_stop_comes_to_rest);
     return UNITY_END();
