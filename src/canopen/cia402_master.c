@@ -23,17 +23,12 @@ static bool is_for_ours(const cia402_config_t *config, const can_frame_t *nmt)
     return is_ours;
 }
 
-/* Ours, or those that CiA 301 gives the node: another master has its own map. */
+/* All that CiA 301 gives the node, of which ours are some: another master has its own map. */
 static bool is_command(const cia402_t *self, uint32_t id)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
         for (uint32_t i = 0; i < CIA402_COB_RPDOS; i++) {
             if (id == CIA402_COB_RPDO + i * CIA402_COB_NEXT + self->config->axis[k].node) {
-                return true;
-            }
-        }
-        for (unsigned i = CIA402_COMMAND; i < CIA402_ANSWER; i++) {
-            if (self->pdo[k][i].entries > 0 && self->pdo[k][i].id == id) {
                 return true;
             }
         }
