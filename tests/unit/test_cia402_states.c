@@ -6,6 +6,7 @@
 
 #include "../../src/canopen/cia402_master.h"
 #include "../../src/canopen/cia402_node.h"
+#include "../../src/canopen/cia402_objects.h"
 #include "../../src/canopen/cia402_stage.h"
 #include "sim_can.h"
 #include "unity.h"
@@ -198,6 +199,42 @@ static void test_objects_are_not_asked_for_before_the_first_poll_or_on_a_bus_tha
     TEST_ASSERT_EQUAL(HV_ERR_AGAIN, drives_object_begin(m_drives, 2, &read));
 }
 
+/* Requests that a drive may miss: for the guard time that it has, or that it shall have, and no more than a byte holds. */
+static void test_life_factor_covers_the_time_of_silence(void)
+{
+    const cia402_object_t row = {.source = CIA402_LIFE_FACTOR, .bytes = 1};
+    cia402_setup_t setup = {.guard_ms = 0};
+    TEST_ASSERT_EQUAL_UINT32(4, cia402_object_value(&row, &m_config, &m_config.axis[0], &setup));
+    setup.guard_ms = 70;
+    TEST_ASSERT_EQUAL_UINT32(3, cia402_object_value(&row, &m_config, &m_config.axis[0], &setup));
+    m_config.heartbeat_timeout_ms = 60000;
+    TEST_ASSERT_EQUAL_UINT32(255, cia402_object_value(&row, &m_config, &m_config.axis[0], &setup));
+}
+
+/* ---- frames ---- */
+
+/* What a drive of ours sends beside its answers is none of the driver's: time stamps of others, objects of a maker. */
+static void test_frames_that_nobody_has_asked_for_change_nothing(void)
+{
+    static const uint16_t k_ids[] = {0x103, 0x583 + 0x40, 0x603, 0x680 + 3};
+    drive_feedback_t feedback[DRIVES_MAX];
+    sim_can_t other;
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&other, &m_bus, NULL, 0));
+    (void)!drives_poll(m_drives, m_driver.now_us + 1000, feedback);
+    const cia402_axis_t before = m_driver.axis[2];
+    for (unsigned i = 0; i < 4; i++) {
+        const can_frame_t frame = {.id = k_ids[i], .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&other), &frame));
+    }
+    sim_can_bus_step(&m_bus, m_driver.now_us + 500);
+    (void)!drives_poll(m_drives, m_driver.now_us + 1000, feedback);
+    TEST_ASSERT_EQUAL(before.phase, m_driver.axis[2].phase);
+    TEST_ASSERT_EQUAL_HEX32(before.trouble, m_driver.axis[2].trouble);
+    TEST_ASSERT_EQUAL_UINT32(0, m_driver.axis[2].emergency.count);
+    TEST_ASSERT_FALSE(m_driver.axis[2].has_actual);
+    sim_can_close(&other);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -209,5 +246,7 @@ int main(void)
     RUN_TEST(test_node_answers_where_each_of_its_axes_has);
     RUN_TEST(test_counts_are_unknown_before_the_first_position);
     RUN_TEST(test_objects_are_not_asked_for_before_the_first_poll_or_on_a_bus_that_is_gone);
+    RUN_TEST(test_life_factor_covers_the_time_of_silence);
+    RUN_TEST(test_frames_that_nobody_has_asked_for_change_nothing);
     return UNITY_END();
 }
