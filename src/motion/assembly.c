@@ -22,36 +22,41 @@ static bool is_held_or_better(const platform_t *self, const q32_t extension_mm_q
             kin_margin(&self->kin, &pose) > kin_margin(&self->kin, &self->pose));
 }
 
-/* A little way from the set-points towards extensions, straight.
- * @param longest_q32 the way is as long as that at least: AHEAD_Q32 ends it at the extensions, less leads beyond near ones */
-static void look_ahead(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t longest_q32,
-                       q32_t ahead_mm_q32[CYLINDERS_MAX])
+static q32_t longest_way(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
 {
+    q32_t longest_q32 = 1;
     for (unsigned i = 0; i < self->cylinders; i++) {
         const q32_t travel_q32 = fx_abs(extension_mm_q32[i] - self->cylinder[i].state.pos_q32);
         longest_q32 = travel_q32 > longest_q32 ? travel_q32 : longest_q32;
     }
+    return longest_q32;
+}
+
+/* Straight from the set-points towards extensions, the share AHEAD_Q32 / of_q32 of the way there. */
+static bool is_held_on_way(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t of_q32)
+{
+    q32_t ahead_mm_q32[CYLINDERS_MAX] = {0};
     for (unsigned i = 0; i < self->cylinders; i++) {
         const q32_t here_q32 = self->cylinder[i].state.pos_q32;
-        ahead_mm_q32[i] = here_q32 + fx_mul_div(extension_mm_q32[i] - here_q32, AHEAD_Q32, longest_q32);
+        ahead_mm_q32[i] = here_q32 + fx_mul_div(extension_mm_q32[i] - here_q32, AHEAD_Q32, of_q32);
     }
+    return is_held_or_better(self, ahead_mm_q32);
 }
 
 /* Whether the first step there is possible. */
 static bool is_held_ahead(const platform_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
 {
-    q32_t ahead_mm_q32[CYLINDERS_MAX] = {0};
-    look_ahead(self, extension_mm_q32, AHEAD_Q32, ahead_mm_q32);
-    return is_held_or_better(self, ahead_mm_q32);
+    const q32_t longest_q32 = longest_way(self, extension_mm_q32);
+    return is_held_on_way(self, extension_mm_q32, longest_q32 > AHEAD_Q32 ? longest_q32 : AHEAD_Q32);
 }
 
-/* Whether it is too near a singularity already, and on a way out: margins have steps, so that where a short stop ends is no
- * better than here. */
+/* Whether it is too near a singularity already, and on a way out. Margins have steps: where a short stop ends is no better than
+ * here, so what is behind its end counts then. */
 static bool is_leaving(const platform_t *self, const q32_t rest_q32[CYLINDERS_MAX])
 {
-    q32_t ahead_mm_q32[CYLINDERS_MAX] = {0};
-    look_ahead(self, rest_q32, 1, ahead_mm_q32);
-    return !kin_has_margin(&self->kin, &self->pose, KIN_MARGIN_LEAST_Q32) && is_held_or_better(self, ahead_mm_q32);
+    const q32_t longest_q32 = longest_way(self, rest_q32);
+    return !kin_has_margin(&self->kin, &self->pose, KIN_MARGIN_LEAST_Q32) &&
+           is_held_on_way(self, rest_q32, longest_q32 < AHEAD_Q32 ? longest_q32 : AHEAD_Q32);
 }
 
 bool assembly_is_held(const platform_t *self, bool is_beginning, const q32_t extension_mm_q32[CYLINDERS_MAX])
