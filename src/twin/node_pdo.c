@@ -116,7 +116,7 @@ static node_t *apply_entry(node_t *self, uint32_t entry, uint32_t value)
     if (row == NULL || of == NULL) {
         return NULL;
     }
-    row->value = value;
+    row->value = row->is_forced ? row->value : value;
     of->drive.has_set_point |= row->index == 0x607A || row->index == 0x60C1;
     if (row->index == 0x6060 && (int8_t)value != of->drive.mode) {
         (void)drive_choose_mode(&of->drive, (int8_t)value);

@@ -43,6 +43,9 @@ static unsigned place_of(uint16_t index, uint8_t sub)
 void objects_add(objects_t *self, object_t row)
 {
     unsigned place = place_of(row.index, row.sub);
+    if (self->count == OBJECTS_MAX) {
+        return;
+    }
     while (self->place[place] != 0) {
         place = (place + 1u) % OBJECT_PLACES;
     }
@@ -143,8 +146,8 @@ uint32_t objects_get(const objects_t *self, uint16_t index, uint8_t sub)
 void objects_put(objects_t *self, uint16_t index, uint8_t sub, uint32_t value)
 {
     object_t *found = objects_find(self, index, sub);
-    if (found != NULL && !found->is_forced) {
-        found->value = value;
+    if (found != NULL) {
+        *(found->is_forced ? &found->was_value : &found->value) = value;
     }
 }
 

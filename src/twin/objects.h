@@ -58,7 +58,7 @@ typedef struct objects {
  *  @param is_first the first axis of its node, whose PDOs have identifiers by themselves */
 void objects_start(objects_t *self, uint8_t node, const uint32_t identity[4], bool is_first);
 
-/** One more, of the maker. Its value is the one after a reset. */
+/** One more, of the maker; none where there is no room. Its value is the one after a reset. */
 void objects_add(objects_t *self, object_t row);
 
 /** What a PDO has in it from the factory.
@@ -76,7 +76,7 @@ void objects_reset(objects_t *self);
 /** NULL where there is none. */
 object_t *objects_find(objects_t *self, uint16_t index, uint8_t sub);
 
-/** Of an object that every drive has. One that is forced keeps its value. */
+/** Of an object that every drive has. One that is forced keeps its value, and has this one when it is let go. */
 uint32_t objects_get(const objects_t *self, uint16_t index, uint8_t sub);
 void objects_put(objects_t *self, uint16_t index, uint8_t sub, uint32_t value);
 

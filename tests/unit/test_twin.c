@@ -553,6 +553,23 @@ static void test_mend_gives_objects_and_nodes_back_what_they_were(void)
     TEST_ASSERT_NOT_NULL(last(0x704));
 }
 
+/* What the drive would show meanwhile is there again afterwards. */
+static void test_object_that_the_drive_shows_is_held_until_it_is_mended(void)
+{
+    operational();
+    act("object 1 6061 3");
+    act("object 1 603F 0x1234");
+    ask_write(1, 0x6060, 0, 1, 8);
+    act("fault 1 0x2310");
+    run(10000);
+    TEST_ASSERT_EQUAL_HEX32(3, ask_read(1, 0x6061, 0));
+    TEST_ASSERT_EQUAL_HEX32(0x1234, ask_read(1, 0x603F, 0));
+    act("mend 1");
+    run(10000);
+    TEST_ASSERT_EQUAL_HEX32(8, ask_read(1, 0x6061, 0));
+    TEST_ASSERT_EQUAL_HEX32(0x2310, ask_read(1, 0x603F, 0));
+}
+
 static void test_deaf_drive_waits_for_nothing(void)
 {
     operational();
@@ -783,6 +800,7 @@ int main(void)
     RUN_TEST(test_faults_every_line_of_the_table_can_be_read_and_done);
     RUN_TEST(test_faults_wrong_lines_say_what_is_wrong);
     RUN_TEST(test_faults_of_a_drive_show_on_the_bus);
+    RUN_TEST(test_object_that_the_drive_shows_is_held_until_it_is_mended);
     RUN_TEST(test_mend_gives_objects_and_nodes_back_what_they_were);
     RUN_TEST(test_deaf_drive_waits_for_nothing);
     RUN_TEST(test_script_times_count_from_the_start_or_from_torque);
