@@ -131,10 +131,11 @@ static int64_t sweep_cycles(const excitation_request_t *request, uint32_t cycle_
            ramp_cycles(turn_of(request->to_mhz, cycle_us), cycle_us);
 }
 
-/* The growth itself is ramped in and out, over an eighth of the sweep. */
+/* The growth itself is ramped in and out, over an eighth of the sweep each: growing() adds up to the rest. */
 static int64_t sweep_growth_q62(const excitation_request_t *request, uint32_t cycle_us)
 {
-    return growth_q62(request->from_mhz, request->to_mhz, sweep_cycles(request, cycle_us) / 8 * 7);
+    const int64_t sweep = sweep_cycles(request, cycle_us);
+    return growth_q62(request->from_mhz, request->to_mhz, sweep - (sweep + 7) / 8);
 }
 
 /* Where it grew faster, what it grows by would count beside what it swings by. Six periods of the lowest frequency, of eight

@@ -254,6 +254,21 @@ static void test_chirp_to_the_highest_frequency_ends_there(void)
     }
 }
 
+/* However many cycles the sweep has. */
+static void test_chirp_never_leaves_its_band(void)
+{
+    const path_limits_t wide = path_limits_none();
+    const double band_q64 = ldexp(0.05, 64); /* 50 Hz, in turns per cycle */
+    for (unsigned more = 0; more < 16; more++) {
+        start(wish(EXCITATION_CHIRP, 5, 50, 3.5 + 0.001 * more), &wide, 1000);
+        while (!excitation_is_done(&m_signal)) {
+            (void)excitation_step(&m_signal);
+            TEST_ASSERT_TRUE((double)m_signal.turn_q64[0] <= band_q64);
+        }
+        TEST_ASSERT_TRUE((double)m_signal.turn_q64[0] > 0.97 * band_q64);
+    }
+}
+
 /* What is narrowest still moves: the least limits that a signal can have. */
 static void test_signal_of_the_least_limits_has_an_amplitude(void)
 {
@@ -277,6 +292,7 @@ int main(void)
     RUN_TEST(test_what_makes_no_signal_is_refused);
     RUN_TEST(test_chirp_that_rises_too_quickly_is_refused);
     RUN_TEST(test_chirp_to_the_highest_frequency_ends_there);
+    RUN_TEST(test_chirp_never_leaves_its_band);
     RUN_TEST(test_signal_of_the_least_limits_has_an_amplitude);
     return UNITY_END();
 }
