@@ -64,6 +64,15 @@ static int64_t speed_of(const modbus_drive_axis_t *self, const modbus_drive_map_
                     modbus_drive_field_max(field));
 }
 
+/* A set-point of several blocks goes out whole. Where the position is not in the first one, that is already so once the first one
+ * is submitted: its speed is for this position. */
+static bool is_going_out(const modbus_drive_axis_t *self, const modbus_drive_map_t *map)
+{
+    unsigned block = 0;
+    (void)modbus_drive_find(&map->setpoint, MODBUS_DRIVE_POSITION, &block);
+    return self->step != 0 || (block != 0 && self->write.is_out);
+}
+
 void modbus_drive_axis_offer(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
                              uint64_t now_us)
 {
@@ -73,8 +82,8 @@ void modbus_drive_axis_offer(modbus_drive_axis_t *self, const modbus_drive_map_t
     }
     self->sum_q32 = fx_add_sat(self->sum_q32, self->paced_q32);
     self->sums++;
-    if (self->step != 0) {
-        return; /* a set-point of several blocks goes out whole */
+    if (is_going_out(self, map)) {
+        return;
     }
     self->offered_q32 = mean_of(self->sum_q32, self->sums);
     self->is_fresh = true;

@@ -278,8 +278,8 @@ static void power_cia402(uint8_t axis, bool is_on)
 /* Operation enabled, quick stop, fault reaction. */
 static bool has_torque_cia402(uint8_t axis)
 {
-    const uint16_t status = canopen_drives.drive[axis].node.drive.state;
-    return status == 0x27 || status == 0x07 || status == 0x0F;
+    const twin_state_t state = canopen_drives.drive[axis].node.drive.state;
+    return state == TWIN_ENABLED || state == TWIN_QUICK_STOP || state == TWIN_REACTION;
 }
 
 static void glide_cia402(uint32_t for_us)

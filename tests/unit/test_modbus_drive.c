@@ -905,6 +905,28 @@ static void test_speed_register_lets_the_drive_arrive(void)
     }
 }
 
+/* Position and speed in blocks of their own, in either order: they belong together, or the drive falls further and further
+ * behind. */
+static void test_speed_register_of_its_own_belongs_to_the_position(void)
+{
+    static const modbus_drive_block_t k_position = {10, 2, 1, 0, {0}, {{MODBUS_DRIVE_POSITION, 0, 2, true, false}}};
+    static const modbus_drive_block_t k_speed = {12, 1, 1, 0, {0}, {{MODBUS_DRIVE_SPEED, 0, 1, false, false}}};
+    static const uint32_t k_transactions_us[] = {300, 1500, 2500};
+    for (unsigned i = 0; i < 6; i++) {
+        map = modbus_maps_wide(false);
+        map.setpoint = (modbus_drive_blocks_t){2, {i % 2 == 0 ? k_position : k_speed, i % 2 == 0 ? k_speed : k_position}};
+        map.feedback_timeout_us = 300000;
+        open_slaves(false, false, k_transactions_us[i / 2]);
+        slave.map.setpoint = map.setpoint;
+        enable();
+        move(MM(1) / 20, 0, 2000);
+        const int32_t travel = wide_counts(START_MM) - wide_counts(START_MM + 1); /* of a mm */
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_INT32_WITHIN(travel, slave.asked[k].target, register_drive_count(&slave.twin[k]));
+        }
+    }
+}
+
 /* 50 mm/s again, but a drive that takes more than 40 mm/s for an alarm. */
 static void test_speed_register_keeps_below_its_limit(void)
 {
@@ -1632,6 +1654,7 @@ int main(void)
     RUN_TEST(test_pace_unlimited_where_carry_is_none);
     RUN_TEST(test_speed_register_fits_the_period_of_the_line);
     RUN_TEST(test_speed_register_lets_the_drive_arrive);
+    RUN_TEST(test_speed_register_of_its_own_belongs_to_the_position);
     RUN_TEST(test_speed_register_keeps_below_its_limit);
     RUN_TEST(test_smoothing_takes_out_what_the_line_cannot_carry);
     RUN_TEST(test_blocks_of_a_setpoint_go_out_whole);
