@@ -281,6 +281,11 @@ uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us);
  *  @return HV_OK; HV_ERR_RANGE above intensity_max_percent: nothing changes. */
 hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent) HV_MUST_CHECK;
 
+/** How fast the platform rises from now on, in percent of engage speed (see motion_set_rise_percent); 100 to begin with. Allowed
+ *  in every state.
+ *  @return HV_OK; HV_ERR_RANGE: not 1 to 100; nothing changes */
+hv_status_t gateway_set_rise_percent(gateway_t *self, unsigned percent) HV_MUST_CHECK;
+
 /** One cycle: receive, read feedback, supervise, plan, solve, limit, send, publish.
  *  @param now_us one cycle_us more than the last time */
 void gateway_cycle(gateway_t *self, uint64_t now_us);

@@ -101,6 +101,13 @@ q32_t motion_angle_target(const motion_t *self);
  *  @return HV_OK; HV_ERR_RANGE above intensity_max_percent: nothing changes */
 hv_status_t motion_set_intensity(motion_t *self, unsigned percent) HV_MUST_CHECK;
 
+#define MOTION_RISE_PERCENT_MAX 100
+
+/** How fast the next ways to the neutral pose are, in percent of engage speed; 100 to begin with. Ways down are not slowed: they
+ *  end a motion. The way that is running goes on as it was planned.
+ *  @return HV_OK; HV_ERR_RANGE: not 1 to 100; nothing changes */
+hv_status_t motion_set_rise_percent(motion_t *self, unsigned percent) HV_MUST_CHECK;
+
 /** Intensity asked for and in force, for display. */
 const intensity_t *motion_intensity(const motion_t *self);
 

@@ -108,6 +108,7 @@ typedef struct {
 struct motion {
     platform_t platform;
     intensity_t intensity;
+    int64_t rise_percent; /**< of engage speed, for a way to the neutral pose */
     motion_source_t source;
     motion_next_t next;
     motion_plan_t plan;

@@ -107,6 +107,10 @@ class Platform:
     def shutdown(self) -> dict[str, Any]:
         return self.request("shutdown")
 
+    def commissioned(self) -> dict[str, Any]:
+        """Says that the platform was seen to rise as it should: from now on it does so at engage speed."""
+        return self.request("commissioned")
+
     def acknowledge(self) -> dict[str, Any]:
         return self.request("acknowledge")
 

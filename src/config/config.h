@@ -372,11 +372,12 @@ typedef struct {
     settings_t settings;
     config_udp_t udp;
     config_circle_t base, plate;
-    bool is_as_measured;             /**< joints that look wrong are intended: see layout.h */
-    uint32_t late_hold_cycles;       /**< of the program: see daemon/motion_loop.h */
-    char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
-    config_label_t approved;         /**< hash of the one that was approved, "" = any */
-    char hash[CONFIG_HASH_MAX];      /**< of this one; follows from the rest (hash.h) */
+    bool is_as_measured;                /**< joints that look wrong are intended: see layout.h */
+    uint32_t late_hold_cycles;          /**< of the program: see daemon/motion_loop.h */
+    char life_file[CONFIG_PATH_MAX];    /**< "none" = none */
+    config_label_t approved;            /**< hash of the one that was approved, "" = any */
+    char hash[CONFIG_HASH_MAX];         /**< of this one; follows from the rest (hash.h) */
+    char machine_hash[CONFIG_HASH_MAX]; /**< of the keys that describe the machine; likewise */
     config_selftest_t selftest;
     char control_socket[CONFIG_PATH_MAX];
     char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */

@@ -21,18 +21,36 @@ static bool counts(const config_key_t *key, const config_t *config)
     return config_is_applicable(section->needs, config) && config_is_applicable(key->needs, config) && !is_approval(key);
 }
 
+/* Defaults are not: a key that a later version adds leaves the machine what it was. */
+static bool is_of_machine(const config_key_t *key, const char *value)
+{
+    const bool is_kind = strcmp(key->section, "platform") == 0 && strcmp(key->name, "kind") == 0;
+    const bool is_default = key->fallback != NULL && strcmp(key->fallback, value) == 0;
+    return (is_kind || config_sections[config_section_find(key->section)].is_of_machine) && !is_default;
+}
+
+static void add_line(sha256_t *hash, sha256_t *machine, const config_text_t *line, bool is_of_both)
+{
+    sha256_add(hash, line->data, strlen(line->data) + 1); /* its end is a part of it */
+    if (is_of_both) {
+        sha256_add(machine, line->data, strlen(line->data) + 1);
+    }
+}
+
 void config_hash(config_t *config)
 {
     config_text_t value;
-    sha256_t hash;
+    sha256_t hash, machine;
     sha256_start(&hash);
+    sha256_start(&machine);
     for (size_t i = 0; i < config_key_count; i++) {
         const config_key_t *key = &config_keys[i];
         if (counts(key, config)) {
             config_text_clear(&value);
             config_text_add(&value, "%s.%s = ", key->section, key->name);
+            const size_t before = strlen(value.data);
             config_value_format(key, config, &value);
-            sha256_add(&hash, value.data, strlen(value.data) + 1); /* its end is a part of it */
+            add_line(&hash, &machine, &value, is_of_machine(key, &value.data[before]));
         }
     }
     for (size_t i = 0; i < config_section_count; i++) {
@@ -41,9 +59,10 @@ void config_hash(config_t *config)
             config_text_clear(&value);
             config_text_add(&value, "%s ", config_sections[i].name);
             config_startup_format(&list->item[k], &value);
-            sha256_add(&hash, value.data, strlen(value.data) + 1);
+            add_line(&hash, &machine, &value, config_sections[i].is_of_machine);
         }
     }
+    sha256_end_digits(&machine, config->machine_hash, sizeof config->machine_hash);
     sha256_end_digits(&hash, config->hash, sizeof config->hash);
 }
 

@@ -7,7 +7,9 @@
 
 #include "config/config.h"
 
-/** Fills in config->hash; [platform] approved is no part of it. Allocates nothing. */
+/** Fills in config->hash, and config->machine_hash. [platform] approved is part of neither. The machine's has what a person sees
+ *  in how the platform rises, and no limits or senders: kind, joints, lengths, strokes, drives with their buses and scales, and
+ *  the lines of the switches, where they are no defaults. Allocates nothing. */
 void config_hash(config_t *config);
 
 /** True where the configuration says which one was approved, and is another one. */

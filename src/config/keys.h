@@ -68,6 +68,7 @@ typedef struct {
     const char *name;
     const char *help;
     config_needs_t needs;
+    bool is_of_machine; /**< of what is built, as hash.h has it; [platform] kind is, too */
 } config_section_t;
 
 /** One key. */

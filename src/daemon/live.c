@@ -31,7 +31,7 @@
 #include "linux_clock.h"
 #include "linux_udp.h"
 #include "linux_udp_filter.h"
-#include "service/control.h"
+#include "service/control_commissioned.h"
 #include "service/control_selftest.h"
 
 #define TICK_MS    10
@@ -156,20 +156,20 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
-static void log_acknowledged(live_t *self)
+/* What people have said, and what therefore is not permitted, or slow. */
+static void watch_people(live_t *self)
 {
-    const level_peer_t by = self->control.acknowledged_by;
-    if (by.pid != 0) {
-        writers_say(&self->writers, "configuration %s: acknowledged by user %u, process %d", self->config.hash, (unsigned)by.uid,
-                    (int)by.pid);
+    char said[CONTROL_COMMISSIONED_SAID_MAX];
+    level_peer_t *by = &self->control.acknowledged_by;
+    if (by->pid != 0) {
+        writers_say(&self->writers, "configuration %s: acknowledged by user %u, process %d", self->config.hash, (unsigned)by->uid,
+                    (int)by->pid);
+        by->pid = 0;
     }
-    self->control.acknowledged_by.pid = 0;
-}
-
-static void watch_selftest(live_t *self)
-{
-    char said[128];
     if (control_selftest_watch(&self->control, &self->life, &self->config, said)) {
+        writers_say(&self->writers, "%s", said);
+    }
+    if (control_commissioned_watch(&self->control, &self->life, &self->config, said)) {
         writers_say(&self->writers, "%s", said);
     }
 }
@@ -247,8 +247,7 @@ static void serve_once(live_t *self)
         set_filter(self); /* what is let through of a flood follows from the configuration */
     }
     serve_others(self);
-    log_acknowledged(self);
-    watch_selftest(self);
+    watch_people(self);
     watch_end(self);
     log_trouble(self);
     count_losses(self);
@@ -439,7 +438,7 @@ static int open_all(live_t *self, const config_t *config)
     }
     self->control.samples_fd = self->loop.samples.fd;
     (void)handover_withhold(&self->loop.handover, PERMIT_APPROVAL, config_is_unapproved(config));
-    watch_selftest(self);
+    watch_people(self);
     const hv_status_t status =
         motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->writers.log), linux_clock_hal());
     if (devices_trouble(&self->loop.devices)[0] != '\0') {

@@ -29,6 +29,7 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
     self->clock = clock;
     self->late_hold_cycles = config->late_hold_cycles;
     self->allow = config->udp.allow;
+    self->rise_percent = MOTION_RISE_PERCENT_MAX;
     handover_init(&self->handover);
     self->tap = (udp_recorder_t){
         .behind = udp,
@@ -245,6 +246,17 @@ static void withhold_permits(motion_loop_t *self, switches_change_t change, uint
     }
 }
 
+/* Other than a permit it changes a motion, so a recording has it. */
+static void set_rise_percent(motion_loop_t *self)
+{
+    const uint32_t percent = handover_rise_percent(&self->handover);
+    if (percent != self->rise_percent) {
+        self->rise_percent = percent;
+        motion_note(self, RECORD_RISE, percent);
+        (void)!gateway_set_rise_percent(&self->session.gateway, percent);
+    }
+}
+
 static void press_reset(motion_loop_t *self)
 {
     hal_log_write(self->io.log, HAL_LOG_NOTICE, "the reset button was pressed");
@@ -340,6 +352,7 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     const switches_change_t change = switches_step(&self->switches, self->session.now_us);
     log_blind(self);
     withhold_permits(self, change, skipped);
+    set_rise_percent(self);
     if ((change.on & INPUT_RESET) != 0) {
         press_reset(self);
     }

@@ -42,6 +42,7 @@ typedef struct {
     pthread_t thread;
 
     motion_view_words_t current; /**< private to the motion thread */
+    uint32_t rise_percent;       /**< as last asked of the gateway */
     bool was_estop;
     bool has_feedback; /**< a drive has reported its position; from then on the black box gets every cycle */
     bool has_first_faults;

@@ -82,7 +82,8 @@ void motion_write_down(motion_loop_t *self, bool is_zero)
     note_drives(self, snapshot);
     note_faults(self, snapshot);
     if (is_zero) {
-        note_at(self, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
+        note_at(self, RECORD_ZERO, snapshot->now_us,
+                record_zero(snapshot->goal, snapshot->intensity_percent, self->rise_percent));
     }
     self->has_feedback = self->has_feedback || is_heard(snapshot);
     if (self->has_feedback) {

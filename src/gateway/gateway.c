@@ -146,16 +146,30 @@ uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us)
     return tick_us <= self->snapshot.service.tick_us ? next_us + self->sequencer.service.late_us - tick_us : UINT64_MAX;
 }
 
+static void log_percent(const gateway_t *self, const char *before, unsigned percent, const char *after)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, before);
+    text_put_u32(&text, percent);
+    text_put(&text, after);
+    hal_log_write(self->io.log, HAL_LOG_NOTICE, line);
+}
+
 hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
 {
     const hv_status_t status = motion_set_intensity(&self->motion, percent);
     if (status == HV_OK) {
-        char line[HAL_LOG_TEXT_MAX + 1];
-        text_t text = text_start(line, sizeof line);
-        text_put(&text, "intensity ");
-        text_put_u32(&text, percent);
-        text_put(&text, " %");
-        hal_log_write(self->io.log, HAL_LOG_NOTICE, line);
+        log_percent(self, "intensity ", percent, " %");
+    }
+    return status;
+}
+
+hv_status_t gateway_set_rise_percent(gateway_t *self, unsigned percent)
+{
+    const hv_status_t status = motion_set_rise_percent(&self->motion, percent);
+    if (status == HV_OK) {
+        log_percent(self, "rises at ", percent, " % of engage speed");
     }
     return status;
 }

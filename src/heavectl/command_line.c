@@ -219,6 +219,7 @@ const char *ctl_parse_command(ctl_t *self, int argc, char **argv)
     if (row == NULL) {
         return _(
             "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
+            "commissioned, "
             "intensity, service, service-off, counts, torque, jog, signal, identify, drive, sdo, home, relay, selftest, "
             "setup, config, scope, profile and presets are allowed");
     }

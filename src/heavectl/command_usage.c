@@ -12,7 +12,7 @@ static const usage_row_t k_forms[] = {
     {.argument = "status"},
     {.argument = "[--for SECONDS] [--hz N] watch"},
     {.argument = "--wait [--for SECONDS] engage | resume | park | shutdown"},
-    {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
+    {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge | commissioned"},
     {.argument = "intensity PERCENT"},
     {.argument = "service | service-off | counts"},
     {.argument = "torque N|all on|off"},
@@ -47,6 +47,9 @@ static const usage_row_t k_commands[] = {
     {.name = "seen",
      .help = N_("the same, and all of it has been seen: until then the first fault does not make way for later ones")},
     {.name = "acknowledge", .help = N_("let a configuration move that is not the approved one, until heaved ends")},
+    {.name = "commissioned",
+     .help = N_("the machine was seen to rise as it should: from now on it does so at engage speed, until the machine's keys "
+                "change")},
     {.name = "intensity",
      .argument = "PERCENT",
      .help = N_("how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so")},

@@ -107,6 +107,15 @@ static void show_answer(const ctl_t *self, const cJSON *answer)
     }
 }
 
+/* What whoever asked has to know, though it is done. Not on standard output, which scripts read. */
+static void show_notice(const ctl_t *self, const cJSON *answer)
+{
+    const cJSON *notice = cJSON_GetObjectItemCaseSensitive(answer, "notice");
+    if (cJSON_IsString(notice)) {
+        fprintf(stderr, "%s: %s\n", self->command, translate(notice->valuestring));
+    }
+}
+
 /* True where a request that brings the platform up has ended in FAULT or ESTOP at once: a script has to see that. */
 static bool has_failed(const ctl_t *self, const cJSON *answer)
 {
@@ -130,6 +139,9 @@ int ctl_show(const ctl_t *self, const char *line)
     }
     if (code == EXIT_DONE && !self->is_json && !self->is_waiting) {
         show_answer(self, answer);
+    }
+    if (code == EXIT_DONE && !self->is_json) {
+        show_notice(self, answer);
     }
     cJSON_Delete(answer);
     return code;

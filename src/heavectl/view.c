@@ -383,10 +383,17 @@ static void draw_fault(view_t *self, const cJSON *status)
     }
 }
 
-/* Why the configuration that was applied last is not in force. */
-static void draw_put_back(view_t *self, const cJSON *status)
+/* What the machine was never seen to do, and why the configuration that was applied last is not in force. */
+static void draw_configuration(view_t *self, const cJSON *status)
 {
-    const cJSON *why = view_member(view_member(status, "configuration"), "put_back");
+    const cJSON *configuration = view_member(status, "configuration"), *why = view_member(configuration, "put_back");
+    if (cJSON_IsTrue(view_member(configuration, "slow_rise"))) {
+        view_put_colour(self, YELLOW);
+        view_put_label(self, _("config"));
+        view_put_prose(self, _("not commissioned as it is now: rises at a tenth of engage speed; heavectl commissioned"));
+        view_put_colour(self, PLAIN);
+        view_end_line(self);
+    }
     char shown[SENTENCE_MAX];
     if (!cJSON_IsString(why) || why->valuestring[0] == '\0') {
         return;
@@ -409,7 +416,7 @@ size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char t
     if (is_faulty) { /* at once below the state: of a table that is too long, the end is not seen */
         draw_fault(&view, status);
     }
-    draw_put_back(&view, status);
+    draw_configuration(&view, status);
     draw_poses(&view, status);
     draw_cylinders(&view, status);
     draw_bus(&view, view_member(status, "bus"));

@@ -34,7 +34,7 @@ static hv_status_t init_gate(spike_filter_t *self, const settings_t *s)
 
 hv_status_t motion_init(motion_t *self, const settings_t *settings)
 {
-    *self = (motion_t){.source = MOTION_RESTING};
+    *self = (motion_t){.source = MOTION_RESTING, .rise_percent = MOTION_RISE_PERCENT_MAX};
     hv_status_t status = platform_init(&self->platform, settings);
     status = status == HV_OK ? jog_init(&self->jog, settings) : status;
     status = status == HV_OK ? init_gate(&self->gate, settings) : status;
@@ -77,8 +77,8 @@ void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q
     rest_here(self);
 }
 
-/* All cylinders along a straight line, at engage speed for the one with the longest way. */
-static void start_path(motion_t *self, const q32_t *extension_mm_q32, q32_t angle_deg_q32)
+/* All cylinders along a straight line, at so much of engage speed for the one with the longest way. */
+static void start_path(motion_t *self, const q32_t *extension_mm_q32, q32_t angle_deg_q32, int64_t percent)
 {
     path_t *path = &self->plan.path;
     straight_t *line = &path->way.straight;
@@ -91,6 +91,7 @@ static void start_path(motion_t *self, const q32_t *extension_mm_q32, q32_t angl
         line->history[i] = ramp->state;
         path_limits_narrow(&limits, line->to_q32[i] - here_q32, i == AXIS_ANGLE ? &ramp->limits : &self->platform.engage_limits);
     }
+    limits.vel_q62 -= limits.vel_q62 / MOTION_RISE_PERCENT_MAX * (MOTION_RISE_PERCENT_MAX - percent);
     scurve_plan(&line->curve, &limits, 1);
     path->kind = PATH_STRAIGHT;
     path->axes = AXES_MAX;
@@ -124,10 +125,10 @@ HV_OWN_FRAME static void go_on_after_stop(motion_t *self, uint64_t now_us)
     const q32_t stopped_deg_q32 = self->plan.path.stop.rest_q32[AXIS_ANGLE];
     switch (self->next) {
     case MOTION_THEN_SETTLE:
-        start_path(self, platform->settled_mm_q32, stopped_deg_q32);
+        start_path(self, platform->settled_mm_q32, stopped_deg_q32, MOTION_RISE_PERCENT_MAX);
         break;
     case MOTION_THEN_RISE:
-        start_path(self, platform->neutral_mm_q32, stopped_deg_q32);
+        start_path(self, platform->neutral_mm_q32, stopped_deg_q32, self->rise_percent);
         break;
     case MOTION_THEN_REST:
         rest_here(self);
@@ -137,7 +138,7 @@ HV_OWN_FRAME static void go_on_after_stop(motion_t *self, uint64_t now_us)
             rest_here(self);
             begin_following(self, now_us);
         } else {
-            start_path(self, platform->neutral_mm_q32, platform->axis[AXIS_ANGLE].state.pos_q32);
+            start_path(self, platform->neutral_mm_q32, platform->axis[AXIS_ANGLE].state.pos_q32, self->rise_percent);
         }
         break;
     }
@@ -336,6 +337,15 @@ const pose_t *motion_pose(const motion_t *self)
 hv_status_t motion_set_intensity(motion_t *self, unsigned percent)
 {
     return intensity_set(&self->intensity, percent);
+}
+
+hv_status_t motion_set_rise_percent(motion_t *self, unsigned percent)
+{
+    if (percent == 0 || percent > MOTION_RISE_PERCENT_MAX) {
+        return HV_ERR_RANGE;
+    }
+    self->rise_percent = percent;
+    return HV_OK;
 }
 
 const intensity_t *motion_intensity(const motion_t *self)

@@ -23,6 +23,7 @@ static const char k_too_long[] = "the text is longer than 65507 bytes, more than
 static const char k_words_behind[] = "there is more on the line than the request takes; a comment has a line of its own";
 static const char k_bad_estop[] = "!estop without its word; on and off are allowed";
 static const char k_bad_intensity[] = "!intensity without its percent; whole numbers from 0 to 100 are allowed";
+static const char k_bad_rise[] = "!rise without its percent; whole numbers from 1 to 100 are allowed";
 static const char k_bad_late[] = "!late without its number of cycles; 0 to 4294967295 is allowed";
 static const char k_bad_from[] = "!from without a numeric address; 192.168.1.20, ::1 and fe80::1%2 show what is allowed";
 static const char k_bad_drive[] =
@@ -35,7 +36,8 @@ static const char k_bad_service[] =
     "AGE_US, !beat SERIES COUNTER AGE_US and !release SERIES are allowed (N may be all of torque and home, an axis of jog)";
 static const char k_bad_feedback[] = "!feedback is not as a black box writes it; it has to be left as it is";
 static const char k_bad_request[] =
-    "unknown request; !engage !hold !resume !park !reset !shutdown !service !service-off, !intensity N (0 to 100), !estop on, "
+    "unknown request; !engage !hold !resume !park !reset !shutdown !service !service-off, !intensity N (0 to 100), !rise N (1 to "
+    "100), !estop on, "
     "!estop off, "
     "!torque, !jog, !home, !relay, !beat and !release as a recording has them, !late N, !drive N fault CODE, !drive N offline, "
     "!drive N back, !fault CODE, !fault CODE N, !end and !from ADDRESS are "
@@ -49,6 +51,16 @@ static const struct {
 } k_requests[] = {
     {"engage", EVENT_ENGAGE}, {"hold", EVENT_HOLD},         {"resume", EVENT_RESUME},   {"park", EVENT_PARK},
     {"reset", EVENT_RESET},   {"shutdown", EVENT_SHUTDOWN}, {"service", EVENT_SERVICE}, {"service-off", EVENT_SERVICE_OFF}};
+
+/** Words with a number behind them. */
+static const struct {
+    const char *word;
+    frames_kind_t kind;
+    uint32_t most;
+    const char *why;
+} k_counts[] = {{"intensity", FRAMES_INTENSITY, PERCENT_MAX, k_bad_intensity},
+                {"rise", FRAMES_RISE, PERCENT_MAX, k_bad_rise},
+                {"late", FRAMES_LATE, UINT32_MAX, k_bad_late}};
 
 /** A line being read. */
 typedef struct {
@@ -350,13 +362,11 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
         out->number = parse_word(self, "on");
         return out->number == 1 || parse_word(self, "off") ? NULL : k_bad_estop;
     }
-    if (parse_word(self, "intensity")) {
-        out->kind = FRAMES_INTENSITY;
-        return read_count(self, PERCENT_MAX, &out->number) ? NULL : k_bad_intensity;
-    }
-    if (parse_word(self, "late")) {
-        out->kind = FRAMES_LATE;
-        return read_count(self, UINT32_MAX, &out->number) ? NULL : k_bad_late;
+    for (size_t i = 0; i < sizeof k_counts / sizeof k_counts[0]; i++) {
+        if (parse_word(self, k_counts[i].word)) {
+            out->kind = k_counts[i].kind;
+            return read_count(self, k_counts[i].most, &out->number) ? NULL : k_counts[i].why;
+        }
     }
     if (service_words_are(self->at, (size_t)(self->end - self->at))) {
         uint64_t none = 0;

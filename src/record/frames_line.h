@@ -18,6 +18,7 @@ typedef enum {
     FRAMES_DATAGRAM,  /**< a sender sends text */
     FRAMES_REQUEST,   /**< `!engage` ...: what heavectl would ask for */
     FRAMES_INTENSITY, /**< `!intensity N`: percent of a sender's motion */
+    FRAMES_RISE,      /**< `!rise N`: percent of engage speed with which it rises (recordings hold this) */
     FRAMES_SERVICE,   /**< `!jog ...`, `!torque ...`: by hand (service_words.h; recordings hold this) */
     FRAMES_ESTOP,     /**< `!estop on`, `!estop off` */
     FRAMES_LATE,      /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
@@ -37,7 +38,8 @@ typedef struct {
     uint8_t drive;       /**< FRAMES_DRIVE, FRAMES_FEEDBACK: from 1; FRAMES_FAULT: the axis, 0 where none is concerned */
     fault_code_t fault;  /**< FRAMES_FAULT */
     drive_state_t state; /**< FRAMES_DRIVE: DRIVE_FAULT, DRIVE_OFFLINE, else it is back */
-    uint32_t number; /**< FRAMES_INTENSITY: percent; FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles; FRAMES_DRIVE: a fault's code */
+    uint32_t number;     /**< FRAMES_INTENSITY, FRAMES_RISE: percent; FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles; FRAMES_DRIVE: a
+                            fault's code */
     const uint8_t *text; /**< FRAMES_DATAGRAM: its bytes, escapes resolved; FRAMES_STATE: what stands behind the word */
     uint32_t length;
     drive_feedback_t feedback; /**< FRAMES_FEEDBACK; actual_us is its age */

@@ -158,6 +158,9 @@ static void carry_out(player_t *self, const frames_line_t *line)
     case FRAMES_INTENSITY:
         log_refused(self, line, gateway_set_intensity(gateway, line->number), "intensity beyond [motion] intensity_max_percent");
         break;
+    case FRAMES_RISE:
+        log_refused(self, line, gateway_set_rise_percent(gateway, line->number), "a percentage that is not 1 to 100");
+        break;
     case FRAMES_SERVICE:
         serve(self, line);
         break;

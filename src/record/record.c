@@ -150,6 +150,8 @@ static size_t put_content(char *to, const record_t *record, size_t length)
         return decimal_put_text(to, record->head.value != 0 ? "!estop on" : "!estop off");
     case RECORD_INTENSITY:
         return put_number(to, "!intensity ", record->head.value, "");
+    case RECORD_RISE:
+        return put_number(to, "!rise ", record->head.value, "");
     case RECORD_LATE:
         return put_number(to, "!late ", record->head.value, "");
     case RECORD_DRIVE:
@@ -166,15 +168,19 @@ static size_t put_content(char *to, const record_t *record, size_t length)
     return 0;
 }
 
-/* What brings an offline run, which starts with its own goal and intensity, to those of this one. */
+/* What brings an offline run, which starts with its own goal, intensity and speed, to those of this one. */
 static size_t put_zero(const record_writer_t *self, uint32_t value, char *to)
 {
     const state_t goal = (state_t)(value & 0xFFu);
-    const uint32_t percent = value >> 8;
+    const uint32_t percent = value >> 8 & 0xFFu, rise_percent = value >> 16;
     size_t at = decimal_put_text(to, "; time zero: SETTLED\n");
     if (percent != self->percent) {
         at += decimal_put_ms(&to[at], self->cycle_us);
         at += put_number(&to[at], " !intensity ", percent, "\n");
+    }
+    if (rise_percent != MOTION_RISE_PERCENT_MAX) {
+        at += decimal_put_ms(&to[at], self->cycle_us);
+        at += put_number(&to[at], " !rise ", rise_percent, "\n");
     }
     if (goal == self->goal) {
         return at;

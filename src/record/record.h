@@ -16,6 +16,7 @@ typedef enum {
     RECORD_REQUEST,   /**< value: event_t */
     RECORD_ESTOP,     /**< value: 1 on, 0 off */
     RECORD_INTENSITY, /**< value: percent */
+    RECORD_RISE,      /**< value: percent of engage speed */
     RECORD_LATE,      /**< value: cycles */
     RECORD_DRIVE,     /**< a drive went into DRIVE_FAULT, went DRIVE_OFFLINE or came back; detail: number, from 1, << 8 |
                          drive_state_t;     value: its code */
@@ -47,7 +48,7 @@ typedef struct {
 typedef struct {
     uint32_t cycle_us;
     state_t goal;     /**< that an offline run has at time zero */
-    uint32_t percent; /**< and its intensity */
+    uint32_t percent; /**< and its intensity; it rises at engage speed */
     bool has_zero;
     uint64_t zero_us;
     hal_udp_peer_t from; /**< as the lines so far say */
@@ -73,9 +74,9 @@ void record_push_drives(ring_t *ring, uint64_t t_us, const drive_feedback_t was[
 void record_push_faults(ring_t *ring, const snapshot_t *snapshot);
 
 /** What the platform is to be at time zero: the value of a RECORD_ZERO. */
-static inline uint32_t record_zero(state_t goal, uint32_t intensity_percent)
+static inline uint32_t record_zero(state_t goal, uint32_t intensity_percent, uint32_t rise_percent)
 {
-    return (uint32_t)goal | intensity_percent << 8;
+    return (uint32_t)goal | intensity_percent << 8 | rise_percent << 16;
 }
 
 /** @param engages_alone an offline run engages at time zero by itself */

@@ -16,7 +16,8 @@
 typedef enum {
     LEVEL_LOOK,    /**< status, watch, incidents, tick, counts; and hold, which is never refused to anybody */
     LEVEL_OPERATE, /**< engage, resume, park, intensity down, seen */
-    LEVEL_SERVICE  /**< reset, intensity up, dump, shutdown, acknowledge; service and everything in it that moves or switches */
+    LEVEL_SERVICE  /**< reset, intensity up, dump, shutdown, acknowledge, commissioned; service and everything in it that moves or
+                      switches */
 } level_t;
 
 /** Who has them; private. */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
  * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump, incidents, seen,
- * acknowledge, configuration, configure, by NAME. The service thread owns it; nothing blocks, nothing allocates after the open,
- * and a client that does not read is dropped. An operator can always connect: if all places are taken, heaved closes the
- * connection of the least important client, with an error that says so.
+ * acknowledge, commissioned, configuration, configure, by NAME. The service thread owns it; nothing blocks, nothing allocates
+ * after the open, and a client that does not read is dropped. An operator can always connect: if all places are taken, heaved
+ * closes the connection of the least important client, with an error that says so.
  */
 #ifndef HEAVE_SERVICE_CONTROL_H
 #define HEAVE_SERVICE_CONTROL_H
@@ -112,7 +112,8 @@ typedef struct control {
     uint32_t own_holds; /**< of the motion thread, as far as they are known */
     level_peer_t
         acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */
-    control_selftest_t selftest; /**< what somebody has just said of a self-test; likewise */
+    level_peer_t commissioned_by; /**< who has just said that it rises as it should; likewise */
+    control_selftest_t selftest;  /**< what somebody has just said of a self-test; likewise */
     uint32_t last_id;
     uint32_t last_series; /**< given out: of what somebody has begun to hold */
     control_client_t client[CONTROL_CLIENTS];

@@ -157,6 +157,11 @@ json_t control_client_start_answer(control_client_t *client)
     return json;
 }
 
+/* For who has just asked for it. */
+static const char k_slow[] = N_(
+    "nobody has seen this machine rise as it is configured now: it rises at a tenth of engage speed. Look whether it stands and "
+    "moves as it should; then `heavectl commissioned`");
+
 void control_client_answer_done(control_client_t *client, const snapshot_t *snapshot)
 {
     control_client_log(client, "", snapshot->state);
@@ -164,6 +169,9 @@ void control_client_answer_done(control_client_t *client, const snapshot_t *snap
     json_open(&json, NULL, '{');
     json_bool(&json, "ok", true);
     json_text(&json, "state", state_name(snapshot->state));
+    if (client->request == EVENT_ENGAGE && client->control->lost.is_slow) {
+        json_text(&json, "notice", k_slow);
+    }
     if (client->request == OPERATOR_INTENSITY) {
         json_number(&json, "intensity_percent", snapshot->intensity_percent);
     }

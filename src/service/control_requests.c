@@ -14,6 +14,7 @@
 #include "record/service_words.h"
 #include "service/control_answers.h"
 #include "service/control_client.h"
+#include "service/control_commissioned.h"
 #include "service/control_configuration.h"
 #include "service/control_object.h"
 #include "service/control_geometry.h"
@@ -253,7 +254,7 @@ static void answer_unknown(const control_t *self, control_client_t *client)
         "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
         "shutdown, service, service-off, torque, jog, signal, home, relay, beat, release, sdo, dump, incidents, samples, "
         "geometry, incident-folder, operator-log, configuration, configure DIGEST, seen, "
-        "selftest [passed|failed], acknowledge, by NAME and heard TICK REQUEST are allowed",
+        "selftest [passed|failed], acknowledge, commissioned, by NAME and heard TICK REQUEST are allowed",
         NULL);
 }
 
@@ -275,6 +276,7 @@ static const carrier_t k_carriers[REQUEST_KINDS + 1] = {
     [REQUEST_INCIDENTS] = {.act = control_answer_incidents},
     [REQUEST_SEEN] = {.act = control_answer_seen},
     [REQUEST_ACKNOWLEDGE] = {.act = acknowledge},
+    [REQUEST_COMMISSIONED] = {.act = control_commissioned_accept},
     [REQUEST_SELFTEST] = {.act = control_selftest_answer},
     [REQUEST_SELFTEST_PASSED] = {.act = control_selftest_pass},
     [REQUEST_SELFTEST_FAILED] = {.act = control_selftest_fail},

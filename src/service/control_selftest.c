@@ -5,7 +5,6 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 #include "service/control_client.h"
 #include "service/service_json.h"
@@ -57,18 +56,9 @@ void control_selftest_fail(control_t *self, control_client_t *client)
     note_result(self, client, false);
 }
 
-static uint32_t today(void)
-{
-    struct timespec now = {0};
-    struct tm date = {0};
-    (void)clock_gettime(CLOCK_REALTIME, &now);
-    (void)localtime_r(&now.tv_sec, &date);
-    return (uint32_t)((date.tm_year + 1900) * 10000 + (date.tm_mon + 1) * 100 + date.tm_mday);
-}
-
 bool control_selftest_watch(control_t *self, lifetime_t *life, const config_t *config, char said[128])
 {
-    const uint32_t day = today();
+    const uint32_t day = lifetime_today();
     const bool is_news = self->selftest.is_news;
     if (is_news) {
         lifetime_selftest_t selftest = {.day = day, .is_passed = self->selftest.is_passed};

@@ -9,6 +9,7 @@
 #include "common/ring.h"
 #include "common/seqlock.h"
 #include "config/config.h"
+#include "heave/motion.h"
 #include "heave/telemetry.h"
 
 /** Longest text about the drives' bus, with its end. */
@@ -97,6 +98,9 @@ typedef struct {
     uint32_t late_hold_cycles;
 } motion_reload_t;
 
+/** Of engage speed, where nobody has said yet that this machine rises as it should. */
+#define HANDOVER_SLOW_PERCENT 10u
+
 #define HANDOVER_RELOAD_BYTES  8192u
 #define HANDOVER_REQUEST_BYTES 4096u
 #define HANDOVER_RESULT_BYTES  32768u
@@ -115,6 +119,7 @@ typedef struct {
     uint32_t is_quit;     /**< atomic: the service thread wants an end at once */
     uint32_t is_end_due;  /**< atomic: a signal wants the platform settled, and an end; no request before it delays that */
     uint32_t withheld;    /**< atomic: what the service thread does not permit, PERMIT_APPROVAL | PERMIT_SELFTEST */
+    uint32_t is_slow;     /**< atomic: the platform rises at HANDOVER_SLOW_PERCENT of engage speed */
     uint32_t is_ended;    /**< atomic: the motion thread has done its last cycle */
     uint32_t memory;      /**< atomic: motion_memory_t */
     uint64_t view_word[MOTION_VIEW_WORDS];
@@ -125,7 +130,7 @@ typedef struct {
     uint8_t trace_bytes[HANDOVER_TRACE_BYTES];
 } handover_t;
 
-/** Empties all of them; withheld and is_quit stay as they are. Before there are threads. */
+/** Empties all of them; withheld, is_slow and is_quit stay as they are. Before there are threads. */
 void handover_init(handover_t *self);
 
 /** Withholds permits, or gives them again. Any thread.
@@ -141,6 +146,12 @@ static inline bool handover_withhold(handover_t *self, uint32_t permits, bool is
 static inline bool handover_is_withheld(const handover_t *self, uint32_t permits)
 {
     return (__atomic_load_n(&self->withheld, __ATOMIC_ACQUIRE) & permits) != 0;
+}
+
+/** How fast the platform is to rise, in percent of engage speed. Any thread. */
+static inline uint32_t handover_rise_percent(const handover_t *self)
+{
+    return __atomic_load_n(&self->is_slow, __ATOMIC_ACQUIRE) != 0 ? HANDOVER_SLOW_PERCENT : MOTION_RISE_PERCENT_MAX;
 }
 
 #endif

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "common/clock_trust.h"
@@ -31,7 +32,9 @@ static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
 {
     char digits[DIGITS + 1u];
     const lifetime_selftest_t *selftest = &totals->selftest;
-    const unsigned version = selftest->day == 0 ? 1 : selftest->boot == 0 ? 2 : 3; /* an older heaved can read what it knows */
+    const lifetime_commissioned_t *commissioned = &totals->commissioned;
+    /* an older heaved can read what it knows */
+    const unsigned version = commissioned->day != 0 ? 4 : selftest->day == 0 ? 1 : selftest->boot == 0 ? 2 : 3;
     size_t length =
         (size_t)snprintf(text, TEXT_MAX, "heave life %u\nsequence %" PRIu64 "\nrides %" PRIu64 "\nfaults %" PRIu64 "\naxes %u\n",
                          version, totals->sequence, totals->rides, totals->faults, (unsigned)totals->axes);
@@ -46,6 +49,10 @@ static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
                                    selftest->is_passed ? 1u : 0u);
         length += version == 2 ? 0 : (size_t)snprintf(&text[length], TEXT_MAX - length, " boot %" PRIu64, selftest->boot);
         length += (size_t)snprintf(&text[length], TEXT_MAX - length, " configuration %s\n", selftest->hash);
+    }
+    if (version > 3) {
+        length += (size_t)snprintf(&text[length], TEXT_MAX - length, "commissioned %u machine %s\n", commissioned->day,
+                                   commissioned->hash);
     }
     sha256_digits(text, length, digits, sizeof digits);
     return length + (size_t)snprintf(&text[length], TEXT_MAX - length, "sum %s\n", digits);
@@ -71,23 +78,40 @@ static bool read_axis(const char **at, lifetime_axis_t *axis)
            read_number(at, " travel_milli ", &axis->travel_milli) && read_number(at, " turns ", &axis->turns);
 }
 
+/* A word and the hash behind it, which ends the line. */
+static bool read_hash(const char **at, const char *word, char hash[CONFIG_HASH_MAX])
+{
+    const size_t before = strlen(word);
+    if (strncmp(*at, word, before) != 0) {
+        return false;
+    }
+    const size_t length = strcspn(*at + before, "\n");
+    if (length >= CONFIG_HASH_MAX) {
+        return false;
+    }
+    memcpy(hash, *at + before, length);
+    *at += before + length;
+    return true;
+}
+
 static bool read_selftest(const char **at, bool has_boot, lifetime_selftest_t *selftest)
 {
     uint64_t day = 0, passed = 0;
     if (!read_number(at, "\nselftest ", &day) || !read_number(at, " passed ", &passed) ||
-        (has_boot && !read_number(at, " boot ", &selftest->boot)) || strncmp(*at, " configuration ", 15) != 0) {
-        return false;
-    }
-    *at += 15;
-    const size_t length = strcspn(*at, "\n");
-    if (length >= sizeof selftest->hash) {
+        (has_boot && !read_number(at, " boot ", &selftest->boot)) || !read_hash(at, " configuration ", selftest->hash)) {
         return false;
     }
     selftest->day = (uint32_t)day;
     selftest->is_passed = passed != 0;
-    memcpy(selftest->hash, *at, length);
-    *at += length;
     return true;
+}
+
+static bool read_commissioned(const char **at, lifetime_commissioned_t *commissioned)
+{
+    uint64_t day = 0;
+    const bool is_read = read_number(at, "\ncommissioned ", &day) && read_hash(at, " machine ", commissioned->hash);
+    commissioned->day = (uint32_t)day;
+    return is_read;
 }
 
 /* What was written by format(), and nothing else: it is written again and compared. */
@@ -108,6 +132,9 @@ static bool parse(const char *text, size_t length, lifetime_totals_t *totals)
         }
     }
     if (version > 1 && !read_selftest(&text, version > 2, &totals->selftest)) {
+        return false;
+    }
+    if (version > 3 && !read_commissioned(&text, &totals->commissioned)) {
         return false;
     }
     return format(totals, again) == length && memcmp(again, whole, length) == 0;
@@ -242,6 +269,24 @@ void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftes
     if (self->path[0] != '\0') {
         hand_over(self);
     }
+}
+
+void lifetime_note_commissioned(lifetime_t *self, uint32_t day, const char *machine_hash)
+{
+    self->now.commissioned.day = day;
+    (void)snprintf(self->now.commissioned.hash, sizeof self->now.commissioned.hash, "%s", machine_hash);
+    if (self->path[0] != '\0') {
+        hand_over(self);
+    }
+}
+
+uint32_t lifetime_today(void)
+{
+    struct timespec now = {0};
+    struct tm date = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    (void)localtime_r(&now.tv_sec, &date);
+    return (uint32_t)((date.tm_year + 1900) * 10000 + (date.tm_mon + 1) * 100 + date.tm_mday);
 }
 
 bool lifetime_has_passed(const lifetime_t *self, uint32_t day, const char *hash)

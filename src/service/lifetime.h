@@ -31,6 +31,12 @@ typedef struct {
     char hash[CONFIG_HASH_MAX]; /**< of the configuration it was made with */
 } lifetime_selftest_t;
 
+/** When somebody has seen the platform rise as it should. */
+typedef struct {
+    uint32_t day;               /**< of the local calendar; 0 = never */
+    char hash[CONFIG_HASH_MAX]; /**< machine_hash of the configuration then */
+} lifetime_commissioned_t;
+
 /** What is in a file. */
 typedef struct {
     uint64_t sequence; /**< of the write */
@@ -39,6 +45,7 @@ typedef struct {
     uint32_t axes;
     lifetime_axis_t axis[DRIVES_MAX];
     lifetime_selftest_t selftest;
+    lifetime_commissioned_t commissioned;
 } lifetime_totals_t;
 
 /** The counters; private but for now. */
@@ -73,6 +80,12 @@ void lifetime_serve(lifetime_t *self, const snapshot_t *snapshot, uint64_t now_u
 
 /** Keeps what has come of a self-test, on the disk as soon as it takes it; `boot` is filled in. */
 void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftest);
+
+/** Keeps that the machine was commissioned, likewise. */
+void lifetime_note_commissioned(lifetime_t *self, uint32_t day, const char *machine_hash);
+
+/** The day of the local calendar, as 20261123. */
+uint32_t lifetime_today(void);
 
 /** Whether a self-test has passed on that day, with that configuration. One of before the machine was started counts by its date,
  * so only where the date can be right. */

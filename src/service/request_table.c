@@ -71,6 +71,7 @@ static const row_t k_rows[] = {
     {"sdo",             EITHER,     LEVEL_SERVICE, LOOKS_OR_MOVES, REQUEST_OBJECT},
     {"dump",            ALONE,      LEVEL_SERVICE, SAFE,           REQUEST_DUMP},
     {"acknowledge",     ALONE,      LEVEL_SERVICE, MOVES,          REQUEST_ACKNOWLEDGE},
+    {"commissioned",    ALONE,      LEVEL_SERVICE, MOVES,          REQUEST_COMMISSIONED},
     {"selftest passed", ALONE,      LEVEL_SERVICE, MOVES,          REQUEST_SELFTEST_PASSED},
     {"selftest failed", ALONE,      LEVEL_SERVICE, SAFE,           REQUEST_SELFTEST_FAILED},
     {"configure",       WITH_WORDS, LEVEL_SERVICE, MOVES,          REQUEST_CONFIGURE},

@@ -419,6 +419,13 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_text(json, "digest", lost->digest != NULL ? lost->digest : "");
     json_text(json, "approved", config->approved.text);
     json_bool(json, "barred", lost->is_unapproved);
+    json_text(json, "machine", config->machine_hash);
+    json_bool(json, "slow_rise", lost->is_slow);
+    if (lost->life != NULL && lost->life->commissioned.day != 0) {
+        json_number(json, "commissioned_day", lost->life->commissioned.day);
+    } else {
+        json_null(json, "commissioned_day");
+    }
     json_text(json, "put_back", lost->put_back != NULL ? lost->put_back : "");
     json_close(json, '}');
 }

@@ -21,6 +21,7 @@ typedef struct {
     const char *put_back;          /**< why what was applied is not in force; NULL or "": nothing was put back */
     bool is_untested;              /**< nobody engages until a self-test has passed */
     bool is_unapproved;            /**< nothing moves until somebody has acknowledged the configuration */
+    bool is_slow;                  /**< it rises slowly until somebody has said that it is commissioned */
     bool is_flood;                 /**< the kernel drops what cannot be a frame */
 } status_lost_t;
 

@@ -88,7 +88,8 @@ bool setup_write_report(const setup_t *self, const char *path, const char *file,
         write_chapter(self, k_chapters[i].beginning, k_chapters[i].title, report.stream);
     }
     fprintf(report.stream, "\n%s\n\n%s ____________________________________\n",
-            _("Still to be done before people board: heavectl selftest, the limits and the e-stop chain (docs/safety.md)."),
+            _("Still to be done before people board: the first rises, then heavectl commissioned (docs/commissioning.md); "
+              "heavectl selftest, the limits and the e-stop chain (docs/safety.md)."),
             _("Date and signature:"));
     return atomic_file_close(&report);
 }

@@ -1264,6 +1264,33 @@ static void test_hash_is_of_the_values_and_of_nothing_else(void)
     TEST_ASSERT_FALSE(config_is_unapproved(&m_config));
 }
 
+/* What somebody sees when it rises is of the machine; senders, limits and tuning are not. */
+static void test_hash_of_the_machine_is_of_what_is_built(void)
+{
+    static const struct {
+        const char *section, *key, *value;
+        bool is_of_machine;
+    } k_rows[] = {{"geometry", "stroke_mm", "201", true},
+                  {"geometry", "base1_mm", "160.1, 40, 0", true},
+                  {"inputs", "estop", "7", true},
+                  {"cylinders", "speed_mm_s", "99", false},
+                  {"udp", "port", "9801", false},
+                  {"z", "max_mm", "9", false},
+                  {"platform", "late_hold_cycles", "9", false},
+                  {"service", "jog_mm_s", "4", false}};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        char whole[CONFIG_HASH_MAX], machine[CONFIG_HASH_MAX];
+        take_good_file();
+        (void)load_lines();
+        memcpy(whole, m_config.hash, sizeof whole);
+        memcpy(machine, m_config.machine_hash, sizeof machine);
+        set_key(k_rows[i].section, k_rows[i].key, k_rows[i].value);
+        (void)load_lines();
+        TEST_ASSERT_EQUAL_MESSAGE(k_rows[i].is_of_machine, strcmp(machine, m_config.machine_hash) != 0, k_rows[i].key);
+        TEST_ASSERT_NOT_EQUAL_MESSAGE(0, strcmp(whole, m_config.hash), k_rows[i].key);
+    }
+}
+
 static void test_hash_changes_with_every_number(void)
 {
     unsigned numbers = 0;
@@ -1995,6 +2022,7 @@ int main(void)
     RUN_TEST(test_dump_of_unusual_values_loads_to_the_same);
     RUN_TEST(test_dump_names_every_key_with_unit_range_and_help);
     RUN_TEST(test_hash_is_of_the_values_and_of_nothing_else);
+    RUN_TEST(test_hash_of_the_machine_is_of_what_is_built);
     RUN_TEST(test_hash_changes_with_every_number);
     RUN_TEST(test_load_approved_has_to_be_a_hash_and_somebody_to_wait_for);
     RUN_TEST(test_load_daily_selftest_has_to_have_somebody_to_make_it);

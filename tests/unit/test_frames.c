@@ -324,7 +324,8 @@ static record_writer_t started_writer(void)
 {
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
-    const record_t zero = {.head = {.t_us = 5000, .value = STATE_SETTLED, .kind = RECORD_ZERO}};
+    const record_t zero = {
+        .head = {.t_us = 5000, .value = record_zero(STATE_SETTLED, 0, MOTION_RISE_PERCENT_MAX), .kind = RECORD_ZERO}};
     record_writer_init(&writer, &(settings_t){.cycle_us = 1000}, false);
     TEST_ASSERT_GREATER_THAN_UINT(0, record_writer_line(&writer, &zero, 0, line));
     return writer;
@@ -438,7 +439,7 @@ static void expect_zero(engage_policy_t engage, state_t goal, const char *expect
 {
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
-    const record_t zero = {.head = {.t_us = 5000, .value = (uint32_t)goal, .kind = RECORD_ZERO}};
+    const record_t zero = {.head = {.t_us = 5000, .value = record_zero(goal, 0, MOTION_RISE_PERCENT_MAX), .kind = RECORD_ZERO}};
     record_writer_init(&writer, &(settings_t){.cycle_us = 500}, engage == ENGAGE_AUTO);
     const size_t length = record_writer_line(&writer, &zero, 0, line);
     line[length] = '\0';
@@ -450,13 +451,36 @@ static void test_record_writer_zero_brings_an_offline_run_to_the_same_intensity(
     const settings_t settings = {.cycle_us = 500, .intensity_start_percent = 70};
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
-    record_t zero = {.head = {.t_us = 5000, .value = record_zero(STATE_ENGAGED, 40), .kind = RECORD_ZERO}};
+    record_t zero = {
+        .head = {.t_us = 5000, .value = record_zero(STATE_ENGAGED, 40, MOTION_RISE_PERCENT_MAX), .kind = RECORD_ZERO}};
     record_writer_init(&writer, &settings, false);
     line[record_writer_line(&writer, &zero, 0, line)] = '\0';
     TEST_ASSERT_EQUAL_STRING("; time zero: SETTLED\n0.500 !intensity 40\n0.500 !engage\n", line);
-    zero.head.value = record_zero(STATE_SETTLED, 70);
+    zero.head.value = record_zero(STATE_SETTLED, 70, MOTION_RISE_PERCENT_MAX);
     line[record_writer_line(&writer, &zero, 0, line)] = '\0';
     TEST_ASSERT_EQUAL_STRING("; time zero: SETTLED\n", line);
+}
+
+static void test_record_writer_zero_brings_an_offline_run_to_the_same_rise(void)
+{
+    record_writer_t writer;
+    char line[RECORD_LINE_MAX];
+    const record_t zero = {.head = {.t_us = 5000, .value = record_zero(STATE_ENGAGED, 70, 10), .kind = RECORD_ZERO}};
+    record_writer_init(&writer, &(settings_t){.cycle_us = 500, .intensity_start_percent = 70}, false);
+    line[record_writer_line(&writer, &zero, 0, line)] = '\0';
+    TEST_ASSERT_EQUAL_STRING("; time zero: SETTLED\n0.500 !rise 10\n0.500 !engage\n", line);
+}
+
+static void test_record_writer_rise_reads_back(void)
+{
+    record_writer_t writer = started_writer();
+    char line[RECORD_LINE_MAX];
+    const record_t record = {.head = {.t_us = 6000, .value = 10, .kind = RECORD_RISE}};
+    read_back(line, record_writer_line(&writer, &record, 0, line));
+    TEST_ASSERT_EQUAL_INT(FRAMES_RISE, m_line.kind);
+    TEST_ASSERT_EQUAL_UINT32(10, m_line.number);
+    expect_wrong("1 !rise", "!rise without its percent");
+    expect_wrong("1 !rise 1000", "!rise without its percent");
 }
 
 static void test_record_writer_intensity_reads_back(void)
@@ -508,5 +532,7 @@ int main(void)
     RUN_TEST(test_record_writer_zero_brings_an_offline_run_to_the_same_goal);
     RUN_TEST(test_record_writer_zero_brings_an_offline_run_to_the_same_intensity);
     RUN_TEST(test_record_writer_intensity_reads_back);
+    RUN_TEST(test_record_writer_zero_brings_an_offline_run_to_the_same_rise);
+    RUN_TEST(test_record_writer_rise_reads_back);
     return UNITY_END();
 }

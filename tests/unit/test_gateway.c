@@ -2336,6 +2336,37 @@ static void test_telemetry_errors_of_drives_are_logged_once_a_second(void)
     TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
 }
 
+static unsigned cycles_until(state_t state)
+{
+    unsigned cycles = 0;
+    while (seen()->state != state) {
+        rig_run_ms(&m_rig, 1);
+        TEST_ASSERT_LESS_THAN_UINT(200000, ++cycles);
+    }
+    return cycles;
+}
+
+/* The way down takes as long as ever: it ends a motion, and the service manager waits for it. */
+static void test_rise_percent_slows_what_goes_up_and_nothing_else(void)
+{
+    static const unsigned k_percent[] = {100, 10};
+    unsigned up[2], down[2];
+    engage();
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, gateway_set_rise_percent(&m_rig.gateway, 0));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, gateway_set_rise_percent(&m_rig.gateway, 101));
+    for (unsigned i = 0; i < 2; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, gateway_set_rise_percent(&m_rig.gateway, k_percent[i]));
+        TEST_ASSERT_EQUAL(HV_OK, gateway_request(&m_rig.gateway, EVENT_PARK, m_rig.now_us));
+        down[i] = cycles_until(STATE_SETTLED);
+        TEST_ASSERT_EQUAL(HV_OK, gateway_request(&m_rig.gateway, EVENT_ENGAGE, m_rig.now_us));
+        up[i] = cycles_until(STATE_ENGAGED);
+    }
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "rises at 10 % of engage speed"));
+    TEST_ASSERT_UINT_WITHIN(1, down[0], down[1]);
+    TEST_ASSERT_GREATER_THAN_UINT(up[0] * 5, up[1]);
+    TEST_ASSERT_LESS_THAN_UINT(up[0] * 21 / 2, up[1]);
+}
+
 static void test_intensity_is_taken_within_its_range_and_told(void)
 {
     m_settings.intensity_max_percent = 80;
@@ -2657,6 +2688,7 @@ static void run_supervision(void)
     RUN_TEST(test_telemetry_reports_that_come_and_go_are_told_of_less_often);
     RUN_TEST(test_telemetry_notes_of_drives_are_logged_when_they_change);
     RUN_TEST(test_telemetry_errors_of_drives_are_logged_once_a_second);
+    RUN_TEST(test_rise_percent_slows_what_goes_up_and_nothing_else);
     RUN_TEST(test_intensity_is_taken_within_its_range_and_told);
     RUN_TEST(test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same);
     RUN_TEST(test_shutdown_from_settled_waits_until_the_bus_has_taken_it);

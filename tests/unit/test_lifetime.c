@@ -130,6 +130,23 @@ static void test_selftest_counts_for_its_day_and_configuration(void)
     TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
 }
 
+/* Kept over a start, with and without a self-test; the file says both in words. */
+static void test_commissioned_is_kept_with_its_machine(void)
+{
+    const lifetime_selftest_t selftest = {.day = 20261124, .is_passed = true, .hash = "0123456789abcdef"};
+    TEST_ASSERT_EQUAL(EXIT_DONE, start());
+    TEST_ASSERT_EQUAL_UINT32(0, m_life.now.commissioned.day);
+    lifetime_note_commissioned(&m_life, 20261123, "fedcba9876543210");
+    for (unsigned i = 0; i < 2; i++) {
+        TEST_ASSERT_TRUE(lifetime_close(&m_life));
+        TEST_ASSERT_EQUAL(EXIT_DONE, start());
+        TEST_ASSERT_EQUAL_UINT32(20261123, m_life.now.commissioned.day);
+        TEST_ASSERT_EQUAL_STRING("fedcba9876543210", m_life.now.commissioned.hash);
+        TEST_ASSERT_EQUAL(i == 1, lifetime_has_passed(&m_life, 20261124, "0123456789abcdef"));
+        lifetime_note_selftest(&m_life, &selftest);
+    }
+}
+
 /* With the start of the machine where that is known: an older heaved reads a file without it. */
 static void test_selftest_keeps_the_start_of_the_machine(void)
 {
@@ -301,6 +318,7 @@ int main(void)
     RUN_TEST(test_life_goes_on_after_every_start);
     RUN_TEST(test_life_is_written_once_a_minute_and_when_it_goes_off);
     RUN_TEST(test_selftest_counts_for_its_day_and_configuration);
+    RUN_TEST(test_commissioned_is_kept_with_its_machine);
     RUN_TEST(test_selftest_keeps_the_start_of_the_machine);
     RUN_TEST(test_selftest_of_an_older_start_counts_by_a_date_that_can_be_right);
     RUN_TEST(test_life_survives_any_damage_of_one_file);

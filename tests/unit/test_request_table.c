@@ -48,6 +48,7 @@ static void test_request_level_of_each_request(void)
         {"incidents", LEVEL_LOOK},
         {"seen", LEVEL_OPERATE},
         {"acknowledge", LEVEL_SERVICE},
+        {"commissioned", LEVEL_SERVICE},
         {"sdo 1 6041:00", LEVEL_SERVICE},
         {"sdo 1 6083:00 5", LEVEL_SERVICE},
     };
@@ -62,7 +63,8 @@ static void test_request_read_what_can_start_or_enlarge_a_motion(void)
         "engage",      "resume",        "park",        "reset",           "shutdown",
         "service",     "intensity 41",
 
-        "torque 1 on", "torque all on", "acknowledge", "selftest passed", "configure 0123456789abcdef"};
+        "torque 1 on", "torque all on", "acknowledge", "selftest passed", "configure 0123456789abcdef",
+        "commissioned"};
     static const char *const k_others[] = {
         "hold",  "release 5", "service-off", "intensity 40",    "intensity 0", "torque 1 off", "torque all off", "status",
         "watch", "dump",      "seen",        "selftest failed", "selftest",    "by on",        "beat 1 1 1",     ""};
