@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT
  * command_line.c - what heavectl is asked for; see ctl.h.
  */
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "common/message.h" // exit codes
+#include "common/nearest.h"
 #include "common/translate.h"
 #include "common/usage.h"
 #include "heavectl/ctl.h"
@@ -206,22 +208,51 @@ static const char *stray_option(const ctl_t *self, const char *command)
     return self->eds != NULL && self->save == NULL ? _("--eds goes with --save") : NULL;
 }
 
+/* The command that somebody has meant; NULL: none is near. */
+static const char *nearest_command(const char *word)
+{
+    const char *nearest = NULL;
+    unsigned least = UINT_MAX;
+    for (const usage_row_t *row = heavectl_usage.commands; !usage_is_end(row); row++) {
+        const unsigned slips = nearest_slips(word, row->name);
+        if (slips < least && nearest_is_likely(slips, row->name)) {
+            least = slips;
+            nearest = row->name;
+        }
+    }
+    return nearest;
+}
+
+/* There is none, or no such: names what is meant, else all there are. */
+static const char *no_command(const char *word)
+{
+    static char wrong[1024];
+    char all[512];
+    const char *nearest = word != NULL ? nearest_command(word) : NULL;
+    size_t length = 0;
+    for (const usage_row_t *row = heavectl_usage.commands; !usage_is_end(row) && length < sizeof all; row++) {
+        length += (size_t)snprintf(&all[length], sizeof all - length, "%s%s", length > 0 ? ", " : "", row->name);
+    }
+    if (word == NULL) {
+        (void)snprintf(wrong, sizeof wrong, _("a command is needed; allowed: %s"), all);
+    } else if (nearest != NULL) {
+        (void)snprintf(wrong, sizeof wrong, _("unknown command \"%.200s\", the nearest is %s"), word, nearest);
+    } else {
+        (void)snprintf(wrong, sizeof wrong, _("unknown command \"%.200s\"; allowed: %s"), word, all);
+    }
+    return wrong;
+}
+
 const char *ctl_parse_command(ctl_t *self, int argc, char **argv)
 {
     static char wrong[128];
     if (optind == argc) {
-        return _(
-            "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump, acknowledge or intensity "
-            "PERCENT");
+        return no_command(NULL);
     }
     const usage_row_t *row = find_command(argv[optind]);
     const int words = argc - optind - 1;
     if (row == NULL) {
-        return _(
-            "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
-            "commissioned, "
-            "intensity, service, service-off, counts, torque, jog, signal, identify, drive, sdo, home, relay, selftest, "
-            "setup, config, scope, profile and presets are allowed");
+        return no_command(argv[optind]);
     }
     const bool is_all_columns = strcmp(row->name, "scope") == 0 && words == 0;
     if (!is_all_columns && !is_enough(row->argument, words)) {

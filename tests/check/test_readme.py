@@ -178,7 +178,7 @@ class Manual:
         table = re.search(r"^## heavectl\n.*?(?=^## )", page(self.of("operation")), re.M | re.S)[0]
         named = re.findall(r"^\| `([\w-]+)` \|", table, re.M)
         answer = run(self.programs["heavectl"], "nonsense").stderr
-        known = re.findall(r"[\w-]+", re.search(r"unknown command; (.*) are allowed", answer)[1].replace(" and ", " "))
+        known = re.findall(r"[\w-]+", re.search(r"unknown command \"nonsense\"; allowed: (.*); see", answer)[1])
         assert sorted(named) == sorted(known), f"named {named}, known {known}"
 
     def exit_codes(self):
