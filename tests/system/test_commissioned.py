@@ -115,6 +115,23 @@ def expect_refused(daemon, words):
         raise AssertionError("it was not refused")
 
 
+def from_the_rise(trace):
+    """States and set-points of each cycle from the first rise on; the times of a replay begin elsewhere."""
+    rows = [line.split(",") for line in trace.read_text(encoding="utf-8").splitlines() if line[:1].isdigit()]
+    first = next(n for n, row in enumerate(rows) if row[1] == "RISING")
+    return [row[1:15] for row in rows[first:]]
+
+
+def replay(daemon, folder):
+    """The recording of a slow rise and a quick one plays back to the same set-points."""
+    frames = folder / "frames"
+    frames.write_text(daemon.frames.read_text(encoding="utf-8").rpartition("\n")[0] + "\n", encoding="utf-8")
+    subprocess.run([BIN / "heaved", "--config", daemon.config, "--play", frames, "--trace", folder / "trace"], check=True, capture_output=True)
+    lived, played = from_the_rise(daemon.trace), from_the_rise(folder / "trace")
+    cycles = min(len(lived), len(played))
+    assert cycles * 0.002 > QUICK_S and lived[:cycles - 1] == played[:cycles - 1], cycles
+
+
 def never_commissioned():
     """Slowly until somebody has looked and said so; then quick, also after a restart; senders and limits change nothing of that, the scale does."""
     with machine() as (folder, _):
@@ -138,6 +155,7 @@ def never_commissioned():
             park(daemon)
             harness.wait_for(lambda: " !rise 100\n" in daemon.frames.read_text(encoding="utf-8"), "it is recorded")
             assert " !rise 10\n" in daemon.frames.read_text(encoding="utf-8")
+            replay(daemon, folder)
         for changes in ({}, {"udp__silence_hold_ms": 900, "z__max_mm": 50, "pose__neutral": "0, 0, 0, 0, 0, 5"}):
             with started(folder, **changes) as daemon:
                 assert configuration(daemon)["slow_rise"] is False, changes
