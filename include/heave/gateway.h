@@ -255,6 +255,10 @@ event_t gateway_withhold(gateway_t *self, uint32_t permits) HV_MUST_CHECK;
  * allow it (see supervisor_missing). */
 uint32_t gateway_missing(gateway_t *self, event_t request);
 
+/** Drives for want of which a request would end in a fault now: bit k for axis k, which does not answer, or is still being set
+ * up. 0: none, or the request brings no drive up. gateway_request() does not look: who asks for a person asks here before. */
+uint32_t gateway_absent(const gateway_t *self, event_t request);
+
 /** A request of an operator: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET, EVENT_SHUTDOWN, EVENT_SERVICE or
  *  EVENT_SERVICE_OFF.
  *  @return HV_OK; HV_ERR_STATE: the state does not allow it, or a permit is missing; nothing changes */

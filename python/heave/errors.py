@@ -18,11 +18,11 @@ class NotRunning(HeaveError):
 
 
 class Refused(HeaveError):
-    """heaved has refused a request; the text is its own."""
+    """heaved has refused a request; the text is its own. answer: all that it said, with "why" where a program may care."""
 
-    def __init__(self, request: str, text: str, state: str | None = None):
+    def __init__(self, request: str, text: str, state: str | None = None, answer: dict[str, Any] | None = None):
         super().__init__(text)
-        self.request, self.state = request, state
+        self.request, self.state, self.answer = request, state, answer or {}
 
 
 class PlatformFault(HeaveError):

@@ -15,6 +15,7 @@ from heave.samples import Samples
 
 RUN = Path("/run/heave")
 LOOK_S = 0.05       # between two looks at the status
+AGAIN_S = 0.1       # between two requests for drives that are not ready
 DUMP_S = 60.0       # a slow disk
 LAST_RESORTS = {"FAULT", "ESTOP"}
 Status = dict[str, Any]
@@ -75,7 +76,7 @@ class Platform:
     @staticmethod
     def _checked(answer: dict[str, Any], request: str) -> dict[str, Any]:
         if not answer.get("ok"):
-            raise Refused(request, str(answer.get("error", "refused without a reason")), answer.get("state"))
+            raise Refused(request, str(answer.get("error", "refused without a reason")), answer.get("state"), answer)
         return answer
 
     def status(self) -> Status:
@@ -89,8 +90,21 @@ class Platform:
     def state(self) -> str:
         return str(self.status()["state"])
 
+    def _bring_up(self, request: str) -> dict[str, Any]:
+        """Drives that are not there yet may be soon: they start, or are being set up. Who asks again says what it has heard, so that a hold in between ends it."""
+        end, text = time.monotonic() + self.timeout, request
+        while True:
+            try:
+                return self.request(text)
+            except Refused as refused:
+                if refused.answer.get("why") != "not-ready" or time.monotonic() >= end:
+                    raise
+                text = f"heard {refused.answer['tick']} {request}"
+            time.sleep(AGAIN_S)
+
     def engage(self) -> dict[str, Any]:
-        return self.request("engage")
+        """Waits for drives that are being set up, for timeout."""
+        return self._bring_up("engage")
 
     def hold(self) -> dict[str, Any]:
         return self.request("hold")
@@ -99,7 +113,8 @@ class Platform:
         return self.request("resume")
 
     def park(self) -> dict[str, Any]:
-        return self.request("park")
+        """As engage(), where the platform is in OFF."""
+        return self._bring_up("park")
 
     def reset(self) -> dict[str, Any]:
         return self.request("reset")

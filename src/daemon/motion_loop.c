@@ -104,7 +104,8 @@ static hv_status_t set_intensity(motion_loop_t *self, uint32_t percent)
     return gateway_set_intensity(&self->session.gateway, percent);
 }
 
-/* What lacks a permit is not asked, nor recorded: a replay knows of no permits, and would carry it out. */
+/* What lacks a permit is not asked, nor recorded: a replay knows of no permits, and would carry it out. Nor is what would end in
+ * a fault because drives are not there yet. */
 static void carry_out(motion_loop_t *self, const motion_request_t *request, motion_result_t *result)
 {
     if (request->event == OPERATOR_SERVICE) {
@@ -117,7 +118,8 @@ static void carry_out(motion_loop_t *self, const motion_request_t *request, moti
     } else {
         const event_t event = (event_t)request->event;
         result->missing = gateway_missing(&self->session.gateway, event);
-        result->status = result->missing != 0 ? HV_ERR_STATE : ask(self, event);
+        result->absent = gateway_absent(&self->session.gateway, event);
+        result->status = result->missing != 0 || result->absent != 0 ? HV_ERR_STATE : ask(self, event);
     }
 }
 
@@ -159,7 +161,7 @@ static unsigned pop_requests(motion_loop_t *self, motion_result_t result[REQUEST
     for (; count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0; count++) {
         result[count].id = request.id;
         result[count].is_later = false;
-        result[count].missing = 0;
+        result[count].missing = result[count].absent = 0;
         result[count].is_old = is_old(self, &request);
         result[count].is_void = is_void(self, &request);
         result[count].status = HV_ERR_STATE;

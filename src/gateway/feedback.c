@@ -39,6 +39,15 @@ bool feedback_has_fault(feedback_t self)
     return !feedback_is_well(self, false);
 }
 
+uint32_t feedback_absent(feedback_t self)
+{
+    uint32_t axes = 0;
+    for (unsigned i = 0; i < self.count; i++) {
+        axes |= self.drive[i].state == DRIVE_OFFLINE ? 1u << i : 0u;
+    }
+    return axes;
+}
+
 uint32_t feedback_energized(feedback_t self, bool is_answering)
 {
     uint32_t axes = 0;

@@ -26,6 +26,9 @@ bool feedback_is_well(feedback_t self, bool is_fault_borne);
 /** Drives in the state. */
 unsigned feedback_count(feedback_t self, drive_state_t state);
 
+/** Drives that do not answer, or are still being set up: bit i for axis i. */
+uint32_t feedback_absent(feedback_t self);
+
 /** Drives that have torque, as far as is known: bit i for axis i + 1. For lost drives: the last known state.
  *  @param is_answering only drives that answer */
 uint32_t feedback_energized(feedback_t self, bool is_answering);

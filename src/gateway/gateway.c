@@ -127,6 +127,12 @@ uint32_t gateway_missing(gateway_t *self, event_t request)
     return supervisor_missing(&self->sequencer.supervisor, request, &view);
 }
 
+uint32_t gateway_absent(const gateway_t *self, event_t request)
+{
+    const bool is_up = self->sequencer.supervisor.state == STATE_OFF && (request == EVENT_ENGAGE || request == EVENT_PARK);
+    return is_up ? feedback_absent(feedback_of(self)) : 0;
+}
+
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
 {
     const cycle_t cycle = cycle_of(self, now_us);

@@ -109,7 +109,10 @@ static const usage_row_t k_options[] = {
     {"socket", "PATH", N_("else the environment's HEAVE_SOCKET, else /run/heave/heaved.sock, else that of the only service"),
      OPTION_SOCKET},
     {"platform", "NAME", N_("the service heave@NAME: /run/heave/NAME/heaved.sock"), OPTION_PLATFORM},
-    {"wait", NULL, N_("engage, resume, park, shutdown: return once it is done, or cannot be any more"), OPTION_WAIT},
+    {"wait", NULL,
+     N_("engage, resume, park, shutdown: return once it is done, or cannot be any more; all but shutdown also wait for heaved to "
+        "start"),
+     OPTION_WAIT},
     {"amplitude", "N", N_("of identify, in mm or degrees; else 2 mm, 1 degree"), OPTION_AMPLITUDE},
     {"band", "FROM-TO", N_("of identify, in Hz; else 0.2-20"), OPTION_BAND},
     {"save", "FILE", N_("drive: what it is set to, into a new file (DCF)"), OPTION_SAVE},

@@ -15,6 +15,7 @@
 #include "common/translate.h"
 #include "heavectl/ctl.h"
 
+#define AGAIN_MS    100
 #define WAIT_MS_MAX 1000 /* a signal between a look and a wait is seen by then */
 
 volatile sig_atomic_t ctl_is_interrupted; /* set by the signal handler, which can reach nothing else */
@@ -56,18 +57,43 @@ static int not_running(const ctl_t *self, int error)
                         self->socket, error_text(error));
 }
 
+/* Returns a connected socket; -1: errno says why not. */
+static int connect_to(const struct sockaddr_un *address)
+{
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && connect(fd, (const struct sockaddr *)address, sizeof *address) != 0) {
+        const int error = errno;
+        (void)close(fd);
+        errno = error;
+        return -1;
+    }
+    return fd;
+}
+
+/* Whether heaved may be about to be there, for who waits until something is done. */
+static bool is_worth_waiting(const ctl_t *self, int error)
+{
+    return (error == ENOENT || error == ECONNREFUSED) && self->is_waiting && strcmp(self->command, "shutdown") != 0 &&
+           ctl_now_ms() < self->ready_by_ms && ctl_is_interrupted == 0;
+}
+
 int ctl_open(ctl_t *self)
 {
+    static const struct timespec k_pause = {.tv_nsec = AGAIN_MS * 1000000};
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     if (strlen(self->socket) >= sizeof address.sun_path) {
         return ctl_complain(EXIT_BAD_USAGE, "%s: a socket's path has at most 107 characters", self->socket);
     }
     memcpy(address.sun_path, self->socket, strlen(self->socket));
-    self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (self->fd < 0 || connect(self->fd, (const struct sockaddr *)&address, sizeof address) != 0) {
-        return not_running(self, errno);
+    self->fd = connect_to(&address);
+    if (self->fd < 0 && is_worth_waiting(self, errno)) {
+        fprintf(stderr, _("heavectl: heaved is not running yet at %s; waiting\n"), self->socket);
     }
-    return EXIT_DONE;
+    while (self->fd < 0 && is_worth_waiting(self, errno)) {
+        (void)nanosleep(&k_pause, NULL);
+        self->fd = connect_to(&address);
+    }
+    return self->fd < 0 ? not_running(self, errno) : EXIT_DONE;
 }
 
 /* Where heaved has closed the link, what it said before is still to be read. A signal that ends the program is the reader's to

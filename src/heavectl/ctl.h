@@ -25,6 +25,7 @@ typedef struct {
     bool is_json;
     bool is_waiting;                  /* --wait */
     double for_s;                     /**< 0 = until interrupted */
+    int64_t until_ms, ready_by_ms;    /**< when that is; how long to wait for heaved and its drives */
     double amplitude, from_hz, to_hz; /**< of identify; 0 = as usual */
     const char *save, *compare, *eds; /* of drive; NULL = not named */
     unsigned hz;                      /**< 0 = as it suits the output */

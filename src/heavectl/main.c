@@ -13,6 +13,7 @@
 
 #include "common/message.h" // exit codes
 #include "common/presets.h"
+#include "common/sentence.h"
 #include "common/standard_descriptors.h"
 #include "common/translate.h"
 #include "common/usage.h"
@@ -32,16 +33,13 @@
 #define ANSWER_MS     5000
 #define DUMP_MS       60000 /* a slow disk */
 #define DRIVE_MS      30000 /* a slow drive */
+#define READY_MS      5000  /* drives that are being set up */
+#define AGAIN_MS      100
 #define TERMINAL_HZ   20u
 #define PLAIN_HZ      1u
 #define WATCH_REQUEST "watch 20" /* of who waits: HOLD may come after 100 ms */
 
 /* When what goes on for a time ends: never before it is over, though this clock counts whole milliseconds. */
-static int64_t until_ms_of(const ctl_t *self)
-{
-    return self->for_s > 0.0 ? ctl_now_ms() + (int64_t)(self->for_s * 1000.0) + 1 : INT64_MAX;
-}
-
 /* Standard output that took everything; EXIT_IO: it has not, and that was said. */
 static int end_stdout(int code)
 {
@@ -51,20 +49,48 @@ static int end_stdout(int code)
     return code;
 }
 
+/* Drives that are not there yet may be soon: they start, or are being set up. Whoever asks again says what it has heard, so that
+ * a hold in between ends it. */
+static bool is_to_ask_again(const ctl_t *self, const char *line, bool is_first, char *request, size_t size)
+{
+    char shown[SENTENCE_MAX];
+    cJSON *answer = cJSON_Parse(line);
+    const cJSON *why = cJSON_GetObjectItemCaseSensitive(answer, "why");
+    const cJSON *tick = cJSON_GetObjectItemCaseSensitive(answer, "tick");
+    const cJSON *error = cJSON_GetObjectItemCaseSensitive(answer, "error");
+    const bool is_again = cJSON_IsString(why) && strcmp(why->valuestring, "not-ready") == 0 && cJSON_IsNumber(tick) &&
+                          cJSON_IsString(error) && ctl_now_ms() < self->ready_by_ms;
+    if (is_again) {
+        (void)snprintf(request, size, "heard %.0f %s", tick->valuedouble, self->command);
+        if (is_first) {
+            fprintf(stderr, _("heavectl: %s; waiting\n"), sentence(error->valuestring, shown, sizeof shown));
+        }
+    }
+    cJSON_Delete(answer);
+    return is_again;
+}
+
 static int ask(ctl_t *self)
 {
+    static const struct timespec k_pause = {.tv_nsec = AGAIN_MS * 1000000};
+    const int most_ms = strcmp(self->command, "dump") == 0 ? DUMP_MS : strcmp(self->command, "sdo") == 0 ? DRIVE_MS : ANSWER_MS;
     char request[80];
     (void)snprintf(request, sizeof request, "%s%s%s", self->command, self->argument != NULL ? " " : "",
                    self->argument != NULL ? self->argument : "");
-    const int64_t until_ms = ctl_now_ms() + (strcmp(self->command, "dump") == 0  ? DUMP_MS
-                                             : strcmp(self->command, "sdo") == 0 ? DRIVE_MS
-                                                                                 : ANSWER_MS);
-    const int code = ctl_send(self, request);
-    if (code != EXIT_DONE) {
-        return code;
+    for (bool is_first = true;; is_first = false) {
+        const int code = ctl_send(self, request);
+        if (code != EXIT_DONE) {
+            return code;
+        }
+        const char *line = ctl_receive(self, ctl_now_ms() + most_ms);
+        if (line == NULL) {
+            return ctl_not_heard(self, _("heaved does not answer"));
+        }
+        if (!is_to_ask_again(self, line, is_first, request, sizeof request)) {
+            return ctl_show(self, line);
+        }
+        (void)nanosleep(&k_pause, NULL);
     }
-    const char *line = ctl_receive(self, until_ms);
-    return line != NULL ? ctl_show(self, line) : ctl_not_heard(self, _("heaved does not answer"));
 }
 
 /* --- Watching --- */
@@ -92,9 +118,8 @@ static bool show_update(const ctl_t *self, const char *line, bool is_terminal)
 /* Until time is up, Ctrl-C, the end of heaved, or a line in which it says no; that is left to show. */
 static int follow(ctl_t *self, bool is_terminal)
 {
-    const int64_t until_ms = until_ms_of(self);
     for (;;) {
-        const char *line = ctl_receive(self, until_ms);
+        const char *line = ctl_receive(self, self->until_ms);
         if (line == NULL) {
             break;
         }
@@ -108,7 +133,7 @@ static int follow(ctl_t *self, bool is_terminal)
     if (ctl_is_interrupted != 0) { /* Ctrl-C in the middle of a write is no fault of the terminal */
         clearerr(stdout);
     }
-    return ctl_is_interrupted != 0 || ctl_now_ms() >= until_ms ? EXIT_DONE : EXIT_UNAVAILABLE;
+    return ctl_is_interrupted != 0 || ctl_now_ms() >= self->until_ms ? EXIT_DONE : EXIT_UNAVAILABLE;
 }
 
 static int watch(ctl_t *self)
@@ -178,14 +203,13 @@ static void show_end(const ctl_t *self, const cJSON *status)
 /* Until the state is there that was asked for, or cannot come any more. */
 static int wait_for_end(ctl_t *self)
 {
-    const int64_t until_ms = until_ms_of(self);
     const bool is_shutdown = strcmp(self->command, "shutdown") == 0;
     int code = ctl_send(self, WATCH_REQUEST);
     bool is_over = code != EXIT_DONE;
     while (!is_over) {
-        const char *line = ctl_receive(self, until_ms);
+        const char *line = ctl_receive(self, self->until_ms);
         if (line == NULL) {
-            const bool is_late = ctl_now_ms() >= until_ms;
+            const bool is_late = ctl_now_ms() >= self->until_ms;
             code = is_late       ? ctl_complain(EXIT_REFUSED, "%s: not done in time; it goes on", self->command)
                    : is_shutdown ? EXIT_DONE
                                  : ctl_not_heard(self, _("heaved has ended"));
@@ -237,9 +261,8 @@ static int watch_counts(ctl_t *self)
         return ask(self);
     }
     ctl_catch_signals();
-    const int64_t until_ms = until_ms_of(self);
     printf("\x1b[2J");
-    while (ctl_is_interrupted == 0 && ctl_now_ms() < until_ms) {
+    while (ctl_is_interrupted == 0 && ctl_now_ms() < self->until_ms) {
         printf("\x1b[H");
         const int code = ask(self);
         (void)fflush(stdout);
@@ -305,9 +328,27 @@ static int carry_out(ctl_t *self)
     return ask(self);
 }
 
+/* What asks no heaved, or looks for one by itself. */
+static bool is_done_alone(ctl_t *self, int *code)
+{
+    if (strcmp(self->command, "presets") == 0) {
+        *code = presets_list(stdout) >= 0 ? EXIT_DONE
+                                          : ctl_complain(EXIT_UNAVAILABLE, "%s: %s", presets_directory(), error_text(errno));
+    } else if (strcmp(self->command, "setup") == 0) {
+        ctl_catch_signals();
+        *code = setup_run(self->argument, &ctl_is_interrupted);
+    } else if (strcmp(self->command, "profile") == 0) {
+        *code = profile_run(self);
+    } else {
+        return false;
+    }
+    return true;
+}
+
 int main(int argc, char **argv)
 {
     static ctl_t ctl;
+    int code = EXIT_DONE;
     if (!standard_descriptors_open()) {
         return ctl_complain(EXIT_UNAVAILABLE, "the null device: %s", error_text(errno));
     }
@@ -325,18 +366,13 @@ int main(int argc, char **argv)
     if (wrong != NULL) {
         return ctl_complain(EXIT_BAD_USAGE, "%s; see heavectl --help", wrong);
     }
-    if (strcmp(ctl.command, "presets") == 0) {
-        return presets_list(stdout) >= 0 ? end_stdout(EXIT_DONE)
-                                         : ctl_complain(EXIT_UNAVAILABLE, "%s: %s", presets_directory(), error_text(errno));
+    if (is_done_alone(&ctl, &code)) {
+        return end_stdout(code);
     }
-    if (strcmp(ctl.command, "setup") == 0) {
-        ctl_catch_signals();
-        return end_stdout(setup_run(ctl.argument, &ctl_is_interrupted));
-    }
-    if (strcmp(ctl.command, "profile") == 0) {
-        return end_stdout(profile_run(&ctl));
-    }
-    int code = ctl_choose_socket(&ctl);
+    const int64_t now_ms = ctl_now_ms();
+    ctl.until_ms = ctl.for_s > 0.0 ? now_ms + (int64_t)(ctl.for_s * 1000.0) + 1 : INT64_MAX;
+    ctl.ready_by_ms = ctl.for_s > 0.0 ? ctl.until_ms : now_ms + READY_MS;
+    code = ctl_choose_socket(&ctl);
     code = code == EXIT_DONE ? ctl_open(&ctl) : code;
     if (code != EXIT_DONE) {
         return code;

@@ -200,7 +200,7 @@ void control_client_answer_service(control_client_t *client, const motion_result
     control_client_answer(client, &json);
 }
 
-static void answer_no(control_client_t *client, const char *error, const char *why, const char *state)
+static json_t start_no(control_client_t *client, const char *error, const char *why, const char *state)
 {
     control_client_log(client, error, control_state(client->control));
     json_t json = control_client_start_answer(client);
@@ -213,6 +213,20 @@ static void answer_no(control_client_t *client, const char *error, const char *w
     if (state != NULL) {
         json_text(&json, "state", state);
     }
+    return json;
+}
+
+static void answer_no(control_client_t *client, const char *error, const char *why, const char *state)
+{
+    json_t json = start_no(client, error, why, state);
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+void control_client_answer_not_ready(control_client_t *client, const char *error, const snapshot_t *snapshot)
+{
+    json_t json = start_no(client, error, "not-ready", state_name(snapshot->state));
+    json_number(&json, "tick", snapshot->service.tick_us);
     json_close(&json, '}');
     control_client_answer(client, &json);
 }

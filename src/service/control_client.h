@@ -43,6 +43,9 @@ void control_client_answer_done(control_client_t *client, const snapshot_t *snap
 void control_client_answer_service(control_client_t *client, const motion_result_t *result);
 void control_client_answer_error(control_client_t *client, const char *error, const char *state);
 
+/** Drives are not there yet. */
+void control_client_answer_not_ready(control_client_t *client, const char *error, const snapshot_t *snapshot);
+
 /** Its request came too late to be done. */
 void control_client_answer_stale(control_client_t *client);
 

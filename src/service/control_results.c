@@ -26,6 +26,15 @@ static control_client_t *find_client(control_t *self, uint32_t request_id)
     return NULL;
 }
 
+/* With the tick of this answer: who asks again says that it has heard it, so that a hold in between counts. */
+static void answer_absent(const control_t *self, control_client_t *client, const motion_result_t *result)
+{
+    char error[512];
+    (void)operator_explain_absent(client->request, &result->snapshot, result->absent, self->view.view.bus_trouble, error,
+                                  sizeof error);
+    control_client_answer_not_ready(client, error, &result->snapshot);
+}
+
 static void reject(const control_t *self, control_client_t *client, const snapshot_t *snapshot, bool is_shutting_down)
 {
     char error[256];
@@ -67,6 +76,9 @@ static void answer_result(const control_t *self, control_client_t *client, const
     } else if (missing != NULL) {
         client->request_id = 0;
         control_client_answer_error(client, missing, state_name(result->snapshot.state));
+    } else if (result->absent != 0) {
+        client->request_id = 0;
+        answer_absent(self, client, result);
     } else if (client->request == OPERATOR_SERVICE) {
         client->request_id = 0;
         control_client_answer_service(client, result);

@@ -76,6 +76,7 @@ typedef struct {
     snapshot_t snapshot;
     bool is_shutting_down;
     uint32_t missing;        /**< refused for want of these permits: PERMIT_KEY | ... */
+    uint32_t absent;         /**< refused for want of these drives: bit k for axis k */
     bool is_old;             /**< refused because of that: see motion_request_t */
     bool is_void;            /**< likewise */
     bool is_later;           /**< private to the motion thread: the answer comes in a later cycle */

@@ -69,23 +69,77 @@ bool operator_read_percent(const char *text, uint32_t *percent)
     return length > 0 && length <= 3 && strspn(text, "0123456789") == length;
 }
 
+static size_t fitted(int length, size_t capacity)
+{
+    return length < 0 ? 0 : (size_t)length < capacity ? (size_t)length : capacity - 1u;
+}
+
 size_t operator_explain_percent(uint32_t percent, unsigned max_percent, char *text, size_t capacity)
 {
     const int length =
         snprintf(text, capacity, N_("intensity %u: too much for this platform; possible: 0 to %u %% ([intensity] max_percent)"),
                  (unsigned)percent, max_percent);
-    return length < 0 ? 0 : (size_t)length < capacity ? (size_t)length : capacity - 1u;
+    return fitted(length, capacity);
 }
 
-/* A drive that would be a fault as soon as the state is one in which drives are watched. */
-static bool is_drive_amiss(const snapshot_t *s)
+/* Numbers from 1, as in "3, 4, 6". */
+static void list_drives(uint32_t drives, char *text, size_t capacity)
 {
-    for (unsigned i = 0; i < s->cylinders + (s->has_angle ? 1u : 0u); i++) {
-        if (s->drive[i].state == DRIVE_FAULT || s->drive[i].state == DRIVE_OFFLINE) {
-            return true;
+    size_t length = 0;
+    text[0] = '\0';
+    for (unsigned i = 0; i < DRIVES_MAX && length < capacity; i++) {
+        if ((drives >> i & 1u) != 0) {
+            length += (size_t)snprintf(&text[length], capacity - length, "%s%u", length > 0 ? ", " : "", i + 1u);
         }
     }
-    return false;
+}
+
+/* What the first of some drives is at, in its driver's words, if it has any; and what leads out.
+ * Returns its index. */
+static unsigned describe_first(const snapshot_t *s, uint32_t drives, char *text, size_t capacity)
+{
+    unsigned first = 0;
+    while (first + 1u < DRIVES_MAX && (drives >> first & 1u) == 0) {
+        first++;
+    }
+    const drive_report_t *report = &s->report[first];
+    const bool has_phase = report->phase != NULL && report->phase[0] != '\0';
+    const bool has_trouble = has_phase && report->code != 0;
+    const char *without_words = s->drive[first].state == DRIVE_FAULT ? N_("it is in fault") : N_("it does not answer");
+    (void)snprintf(text, capacity, "%s%s%s%s", has_phase ? report->phase : without_words, has_trouble ? ": " : "",
+                   has_trouble ? report->trouble : "",
+                   s->drive[first].state == DRIVE_FAULT ? N_("; `reset` leads out of it") : "");
+    return first;
+}
+
+/* The whole sentences, so that a translation has them as such (common/sentence.h). */
+static int explain_drives(event_t request, const snapshot_t *s, uint32_t drives, const char *bus_trouble, char *text,
+                          size_t capacity)
+{
+    char all[4 * DRIVES_MAX], at[160];
+    const char *asked = event_name(request);
+    const unsigned first = describe_first(s, drives, at, sizeof at) + 1u;
+    const bool is_one = (drives & (drives - 1u)) == 0;
+    list_drives(drives, all, sizeof all);
+    return bus_trouble[0] != '\0' ? snprintf(text, capacity, N_("%s: the drives cannot be reached: %s"), asked, bus_trouble)
+           : is_one               ? snprintf(text, capacity, N_("%s: drive %u is not ready: %s"), asked, first, at)
+                    : snprintf(text, capacity, N_("%s: drives %s are not ready; drive %u: %s"), asked, all, first, at);
+}
+
+size_t operator_explain_absent(event_t request, const snapshot_t *snapshot, uint32_t absent, const char *bus_trouble, char *text,
+                               size_t capacity)
+{
+    return fitted(explain_drives(request, snapshot, absent, bus_trouble, text, capacity), capacity);
+}
+
+/* Drives that would be a fault as soon as the state is one in which drives are watched. */
+static uint32_t drives_amiss(const snapshot_t *s)
+{
+    uint32_t drives = 0;
+    for (unsigned i = 0; i < s->cylinders + (s->has_angle ? 1u : 0u); i++) {
+        drives |= s->drive[i].state == DRIVE_FAULT || s->drive[i].state == DRIVE_OFFLINE ? 1u << i : 0u;
+    }
+    return drives;
 }
 
 /* What of a request does not fit the state. */
@@ -100,8 +154,7 @@ static const char *reason(event_t request, const snapshot_t *s)
                                     : N_("the cause is still there");
     }
     if (request == EVENT_SERVICE && (s->state == STATE_OFF || s->state == STATE_SETTLED)) {
-        return is_drive_amiss(s) ? N_("a drive does not answer yet, or is in fault (`counts` says which)")
-                                 : N_("the drives are still going off: try again");
+        return N_("the drives are still going off: try again");
     }
     return request == EVENT_RESUME ? N_("there is nothing to resume") : N_("this is not possible");
 }
@@ -116,6 +169,10 @@ static int explain(event_t request, const snapshot_t *snapshot, bool is_shutting
                         snapshot->state == STATE_HOLD ? N_("shutdown goes on with it, a second signal ends at once")
                                                       : N_("start heaved again once it has ended"));
     }
+    if (request == EVENT_SERVICE && (snapshot->state == STATE_OFF || snapshot->state == STATE_SETTLED) &&
+        drives_amiss(snapshot) != 0) {
+        return explain_drives(request, snapshot, drives_amiss(snapshot), "", text, capacity);
+    }
     if (snapshot->state == STATE_FAULT) {
         return snprintf(text, capacity, N_("%s: %s in %s (%s); possible: %s"), asked, reason(request, snapshot),
                         state_name(snapshot->state), fault_text(snapshot->fault.code), possible);
@@ -127,5 +184,5 @@ static int explain(event_t request, const snapshot_t *snapshot, bool is_shutting
 size_t operator_explain(event_t request, const snapshot_t *snapshot, bool is_shutting_down, char *text, size_t capacity)
 {
     const int length = explain(request, snapshot, is_shutting_down, text, capacity);
-    return length < 0 ? 0 : (size_t)length < capacity ? (size_t)length : capacity - 1u;
+    return fitted(length, capacity);
 }

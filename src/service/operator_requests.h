@@ -35,6 +35,13 @@ event_t operator_request_find(const char *name);
  *  @return within line; NULL: `heard` without a tick or a request */
 const char *operator_request_behind_heard(const char *line, bool *has_heard, uint64_t *tick_us);
 
+/** Why a request was refused for want of drives: which, and what the first of them is at.
+ *  @param absent bit k for axis k; not 0
+ *  @param bus_trouble why none of them can be reached; "": no such reason is known
+ *  @return length without NUL; cut to fit */
+size_t operator_explain_absent(event_t request, const snapshot_t *snapshot, uint32_t absent, const char *bus_trouble, char *text,
+                               size_t capacity);
+
 /** Why a request was refused, and what would be possible.
  *  @param is_shutting_down a shutdown was asked for
  *  @return length without NUL; cut to fit */

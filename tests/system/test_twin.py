@@ -361,6 +361,34 @@ def drives_in_their_own_words(bench):
     words_of(bench.ctl("service-off"))
 
 
+def engage_waits_for_the_drives(bench):
+    """At once after the start, with drives that are still being set up; then with one that has no power."""
+    bench.start_twin()
+    daemon = bench.start()
+    early = bench.ctl("engage")
+    assert early.returncode == 0 and early.stdout == "engage: HOMING\n" and "are not ready; drive 1: " in early.stderr, early
+    bench.wait_state("ENGAGED")
+    assert bench.ctl("park").returncode == 0
+    bench.wait_state("SETTLED")
+    assert bench.ctl("--wait", "shutdown").returncode == 0
+    daemon.wait(timeout=harness.WAIT_S)
+    bench.do("power-off 3")
+    bench.start()
+    missing = bench.ctl("park")
+    assert missing.returncode == 1 and missing.stderr.endswith("heavectl: park: drive 3 is not ready: missing: does not answer: supply, cable, termination, node id, bit rate?\n"), missing
+    status = bench.status()
+    assert (status["state"], status["fault"]["name"]) == ("OFF", "none"), "nothing was begun"
+    for after, wanted in (("hold", "a hold came after it was asked, so it is not done"), ("power-on 3", "engage: ENGAGED")):
+        with subprocess.Popen([bench.bin / "heavectl", "--socket", bench.socket, "--wait", "--for", "30", "engage"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as waiting:
+            assert "drive 3 is not ready: missing" in waiting.stdout.readline()
+            if after == "hold":
+                bench.ctl("hold")
+            else:
+                bench.do(after)
+            assert wanted in waiting.communicate(timeout=harness.WAIT_S)[0]
+        assert waiting.returncode == (1 if after == "hold" else 0) and bench.status()["state"] == ("OFF" if after == "hold" else "ENGAGED")
+
+
 def late_watchdog_is_refused_in_words(bench):
     """The drive waits ten seconds for a gateway that is gone, and cannot be told otherwise."""
     bench.start_twin("--fault", "0 object 2 0x1016:1 0x7F2710")
@@ -449,6 +477,7 @@ CASES = [
     ("heave-twin: without SocketCAN, or without the interface, it says what to do", says_what_is_missing, {}),
     ("heave-twin: torque, following error and inputs of the drives are in status and metrics", telemetry_is_told, {"more": TELLS_ALL}),
     ("heave-twin: heavectl drive and sdo say what a drive is, set it, save it and compare", drives_in_their_own_words, {"platform__engage": "manual"}),
+    ("heave-twin: engage waits for drives that are being set up, names one that is not there, and ends with a hold", engage_waits_for_the_drives, {"platform__engage": "manual"}),
     ("heave-twin: a watchdog that waits far too long is refused, and said in words", late_watchdog_is_refused_in_words, {"platform__engage": "manual"}),
     ("heave-twin: heavectl drive reads the objects of the axis that it is asked for", axes_of_a_node_in_their_own_words, {"nodes": TWO_AXES, "platform__engage": "manual"}),
     ("heave-twin: drives are read where nothing is led, with the errors they kept", drives_are_read_where_nothing_is_led, {}),

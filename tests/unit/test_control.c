@@ -381,6 +381,26 @@ static void test_a_request_that_waits_behind_another_grows_old(void)
     TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "\"stale\""), m_said);
 }
 
+/* A hold between a refusal and the next try ends the tries: whoever tries again says what the refusal told. */
+static void test_who_waits_for_drives_is_told_a_tick_to_come_back_with(void)
+{
+    static motion_result_t result;
+    motion_request_t request;
+    come(0);
+    pass(0);
+    ask(0, "engage\n");
+    pass(0);
+    pass(0);
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0);
+    result = (motion_result_t){.id = request.id, .status = HV_ERR_STATE, .absent = 1u << 2};
+    result.snapshot.service.tick_us = 81204000;
+    TEST_ASSERT_TRUE(ring_push(&m_handover.results, &result, sizeof result, NULL, 0));
+    pass(0);
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "{\"ok\":false,\"error\":\"engage: drive 3 is not ready: it does not answer\","
+                                          "\"why\":\"not-ready\",\"state\":\"OFF\",\"tick\":81204000}"),
+                             m_said);
+}
+
 static void test_who_has_gone_does_not_engage(void)
 {
     come(0);
@@ -906,6 +926,7 @@ int main(void)
     RUN_TEST(test_one_that_came_among_many_is_as_old_as_it_is);
     RUN_TEST(test_what_only_makes_it_safer_has_no_age);
     RUN_TEST(test_a_request_that_waits_behind_another_grows_old);
+    RUN_TEST(test_who_waits_for_drives_is_told_a_tick_to_come_back_with);
     RUN_TEST(test_who_has_gone_does_not_engage);
     RUN_TEST(test_who_has_closed_its_sending_side_is_there);
     RUN_TEST(test_a_tick_says_when_its_client_heard_heaved);

@@ -1837,6 +1837,36 @@ static void test_power_that_fails_stops_what_is_not_settled_in_time(void)
     }
 }
 
+/* Asked before a request that would lead into a fault; the others have their own ways. */
+static void test_drives_that_are_not_there_are_told_before_they_are_brought_up(void)
+{
+    m_settings.engage = ENGAGE_MANUAL;
+    start(false);
+    TEST_ASSERT_EQUAL_HEX32(0x7F,
+                            gateway_absent(&m_rig.gateway, EVENT_ENGAGE)); /* nobody has been heard before the first cycle */
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL_HEX32(0, gateway_absent(&m_rig.gateway, EVENT_ENGAGE));
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 4, 0);
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 0, 0);
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL_HEX32(0x11, gateway_absent(&m_rig.gateway, EVENT_ENGAGE));
+    TEST_ASSERT_EQUAL_HEX32(0x11, gateway_absent(&m_rig.gateway, EVENT_PARK));
+    for (event_t other = 0; other < EVENTS; other++) {
+        TEST_ASSERT_TRUE(other == EVENT_ENGAGE || other == EVENT_PARK || gateway_absent(&m_rig.gateway, other) == 0);
+    }
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL_HEX32(0, gateway_absent(&m_rig.gateway, EVENT_ENGAGE));
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+    m_is_fault_expected = true;
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 4, 0);
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(STATE_FAULT, seen()->state);
+    TEST_ASSERT_EQUAL_HEX32(0, gateway_absent(&m_rig.gateway, EVENT_ENGAGE)); /* the state refuses it, in its own words */
+}
+
 /* What heaved makes of keys, supply and approvals. */
 static void test_what_is_withheld_keeps_the_platform_down_and_leads_it_down(void)
 {
@@ -2664,6 +2694,7 @@ static void run_supervision(void)
     RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
     RUN_TEST(test_channels_apart_are_a_fault_in_estop_that_holds_back_a_reset);
     RUN_TEST(test_power_that_fails_stops_what_is_not_settled_in_time);
+    RUN_TEST(test_drives_that_are_not_there_are_told_before_they_are_brought_up);
     RUN_TEST(test_what_is_withheld_keeps_the_platform_down_and_leads_it_down);
     RUN_TEST(test_each_cycle_that_is_too_late_leads_to_a_hold);
     RUN_TEST(test_a_shutdown_withholds_by_itself_all_that_is_not_its_own);

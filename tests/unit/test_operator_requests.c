@@ -85,15 +85,34 @@ static void test_operator_explain_says_what_service_waits_for(void)
 {
     m_snapshot = (snapshot_t){.state = STATE_OFF, .cylinders = 3};
     (void)operator_explain(EVENT_SERVICE, &m_snapshot, false, m_text, sizeof m_text); /* nothing is heard yet */
-    TEST_ASSERT_EQUAL_STRING(
-        "service: a drive does not answer yet, or is in fault (`counts` says which) in OFF; possible: engage, park, service",
-        m_text);
+    TEST_ASSERT_EQUAL_STRING("service: drives 1, 2, 3 are not ready; drive 1: it does not answer", m_text);
     for (unsigned i = 0; i < 3; i++) {
         m_snapshot.drive[i].state = DRIVE_DISABLED;
     }
     (void)operator_explain(EVENT_SERVICE, &m_snapshot, false, m_text, sizeof m_text);
     TEST_ASSERT_EQUAL_STRING("service: the drives are still going off: try again in OFF; possible: engage, park, service",
                              m_text);
+}
+
+static void test_operator_explain_absent_names_the_drives_and_what_the_first_is_at(void)
+{
+    static const drive_report_t k_refused = {.phase = "refused", .trouble = "does not take an object", .detail = "", .code = 1};
+    static const drive_report_t k_setup = {.phase = "configuring", .trouble = "no error", .detail = ""};
+    m_snapshot = (snapshot_t){.state = STATE_OFF, .cylinders = 6, .has_angle = true};
+    (void)operator_explain_absent(EVENT_ENGAGE, &m_snapshot, 1u << 6, "", m_text, sizeof m_text);
+    TEST_ASSERT_EQUAL_STRING("engage: drive 7 is not ready: it does not answer", m_text);
+    m_snapshot.report[2] = k_setup;
+    m_snapshot.report[5] = k_refused;
+    (void)operator_explain_absent(EVENT_ENGAGE, &m_snapshot, 1u << 2 | 1u << 5, "", m_text, sizeof m_text);
+    TEST_ASSERT_EQUAL_STRING("engage: drives 3, 6 are not ready; drive 3: configuring", m_text);
+    (void)operator_explain_absent(EVENT_PARK, &m_snapshot, 1u << 5, "", m_text, sizeof m_text);
+    TEST_ASSERT_EQUAL_STRING("park: drive 6 is not ready: refused: does not take an object", m_text);
+    m_snapshot.drive[5].state = DRIVE_FAULT;
+    (void)operator_explain_absent(EVENT_PARK, &m_snapshot, 1u << 5, "", m_text, sizeof m_text);
+    TEST_ASSERT_EQUAL_STRING("park: drive 6 is not ready: refused: does not take an object; `reset` leads out of it", m_text);
+    (void)operator_explain_absent(EVENT_PARK, &m_snapshot, 0x7F, "the cable is out", m_text, sizeof m_text);
+    TEST_ASSERT_EQUAL_STRING("park: the drives cannot be reached: the cable is out", m_text);
+    TEST_ASSERT_EQUAL(9, operator_explain_absent(EVENT_PARK, &m_snapshot, 0x7F, "the cable is out", m_text, 10)); /* cut */
 }
 
 /* What a refusal offers has to be something the states take. */
@@ -170,6 +189,7 @@ int main(void)
     RUN_TEST(test_operator_explain_says_why_and_what_else);
     RUN_TEST(test_operator_read_percent_takes_whole_numbers_only);
     RUN_TEST(test_operator_explain_percent_says_the_cap);
+    RUN_TEST(test_operator_explain_absent_names_the_drives_and_what_the_first_is_at);
     RUN_TEST(test_operator_explain_says_what_service_waits_for);
     RUN_TEST(test_operator_explain_offers_only_what_the_states_take);
     RUN_TEST(test_udp_recorder_is_allowed_without_a_list_everyone_is);
