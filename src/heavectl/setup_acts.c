@@ -208,6 +208,17 @@ static size_t scanned(const char *line)
     return 0;
 }
 
+/* "/0x1A2B" behind an address: the fourth of the hexadecimal numbers of its line, where that is not 0. */
+static size_t put_serial(const char *line, char *out, size_t size)
+{
+    const char *const end = line + strcspn(line, "\n"), *at = line;
+    for (unsigned i = 0; i < 4u && at != NULL; i++) {
+        at = strstr(at + (i > 0 ? 2 : 0), "0x");
+    }
+    const unsigned long serial = at != NULL && at < end ? strtoul(at, NULL, 16) : 0;
+    return serial != 0 ? (size_t)snprintf(out, size, "/0x%lX", serial) : 0;
+}
+
 static bool act_scan(setup_session_t *session, const setup_t *setup, char result[SETUP_ANSWER_MAX])
 {
     char bus[SETUP_ANSWER_MAX];
@@ -227,11 +238,13 @@ static bool act_scan(setup_session_t *session, const setup_t *setup, char result
     if (code != EXIT_DONE) {
         return code < 0 ? false : fail(session, _("the bus has to be right first, see above"));
     }
-    for (const char *at = session->output; *at != '\0' && length < SETUP_ANSWER_MAX - 8u;) {
+    for (const char *at = session->output; *at != '\0' && length < SETUP_ANSWER_MAX - 16u;) {
         const size_t words = scanned(at);
         if (words > 0) {
+            char *end = NULL;
             length += (size_t)snprintf(&result[length], SETUP_ANSWER_MAX - length, "%s%lu", length > 0 ? "," : "",
-                                       strtoul(at + words, NULL, 10));
+                                       strtoul(at + words, &end, 10));
+            length += put_serial(end, &result[length], SETUP_ANSWER_MAX - length);
         }
         at += strcspn(at, "\n");
         at += *at == '\n';
@@ -331,6 +344,10 @@ bool setup_act(setup_session_t *session, const setup_t *setup, const setup_quest
         return setup_motion_switch(session, setup, question, result);
     case SETUP_ACT_RISE:
         return setup_motion_rise(session, setup, question, result);
+    case SETUP_ACT_TILT:
+        return setup_motion_tilt(session, setup, question, result);
+    case SETUP_ACT_ENDS:
+        return setup_motion_ends(session, setup, question, result);
     case SETUP_ACT_WRITE:
         return act_write(session, setup, file, result);
     case SETUP_ACT_NONE:

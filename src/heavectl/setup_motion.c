@@ -14,10 +14,14 @@
 #include "common/message.h" // exit codes
 #include "common/translate.h"
 #include "heavectl/hold.h"
+#include "setup/configure.h"
 
 #define JOG_MM_S    2.0
 #define RISE_MM_S   5.0
-#define NEAR_MM     0.02 /* a way that has come so near to its end has come to it */
+#define TILT_DEG_S  1.0
+#define END_MM      2.5    /* heaved leads a cylinder by hand to 2 mm before its end */
+#define FAR_MM      5000.0 /* further than any cylinder goes */
+#define NEAR_MM     0.02   /* a way that has come so near to its end has come to it */
 #define SAME_MM     0.1
 #define QUIET_MS    300 /* a key that is let go comes no more */
 #define PERSON_MS   120000
@@ -184,12 +188,13 @@ bool setup_motion_same(setup_session_t *session, const setup_t *setup, const set
     }
     const double turn = strtod(setup_get(setup, "turn"), NULL), lead_mm = strtod(setup_get(setup, "lead"), NULL);
     const double gear = strtod(setup_get(setup, "gear"), NULL);
-    const char *then = setup_get(setup, "zero.counts"), *is = now;
+    const bool is_supply = strncmp(question->key, "supply.", 7) == 0;
+    const char *then = setup_get(setup, is_supply ? "supply.counts" : "zero.counts"), *is = now;
     bool is_same = true;
     for (unsigned i = 1; then != NULL && is != NULL; i++) {
         const double off_mm = fabs(strtod(then, NULL) - strtod(is, NULL)) * lead_mm / (turn * gear);
         if (off_mm > SAME_MM) {
-            printf(_("Cylinder %u has moved by %.2f mm since: all are to be measured again.\n"), i, off_mm);
+            printf(_("By its count cylinder %u has moved by %.2f mm since.\n"), i, off_mm);
             is_same = false;
         }
         then = strchr(then, ',');
@@ -219,23 +224,106 @@ bool setup_motion_pose(setup_session_t *session, const setup_t *setup, const set
     return is_known || fail(session, _("no pose of the plate has these lengths: \"back\", and measure them again"));
 }
 
+static double pose_member(setup_session_t *session, const char *name)
+{
+    cJSON *status = heaved_link_ask(&session->link, "status");
+    const cJSON *pose = cJSON_GetObjectItemCaseSensitive(status, "pose_actual");
+    const double value = cJSON_IsObject(pose) ? heaved_link_number(pose, name) : NAN;
+    cJSON_Delete(status);
+    return value;
+}
 static double where_up(setup_session_t *session, unsigned index)
 {
     (void)index;
-    cJSON *status = heaved_link_ask(&session->link, "status");
-    const cJSON *pose = cJSON_GetObjectItemCaseSensitive(status, "pose_actual");
-    const double z_mm = cJSON_IsObject(pose) ? heaved_link_number(pose, "z_mm") : NAN;
-    cJSON_Delete(status);
-    return z_mm;
+    return pose_member(session, "z_mm");
+}
+static double where_tilted(setup_session_t *session, unsigned index)
+{
+    return pose_member(session, index <= 2u ? "pitch_deg" : "roll_deg");
 }
 
+/* Whether the cylinders have room for twice a way outwards. */
+static bool has_room(setup_session_t *session, const setup_t *setup, double way_mm)
+{
+    double actual_mm[SETUP_DRIVES_MAX] = {0};
+    bool has = true;
+    const unsigned count = setup_session_counts(session, NULL, actual_mm);
+    for (unsigned i = 0; i < count; i++) {
+        has = has && actual_mm[i] < configure_stroke(setup, i + 1u) - 2 * way_mm;
+    }
+    return has;
+}
+
+/* Once begun it goes on in its direction, however often the key is let go. */
 bool setup_motion_rise(setup_session_t *session, const setup_t *setup, const setup_question_t *question,
                        char result[SETUP_ANSWER_MAX])
 {
+    setup_question_t way = *question;
     if (!setup_session_need_torque(session, setup, question->stage) || !home(session)) {
         return false;
     }
-    return move(session, question, where_up, "z", RISE_MM_S, result);
+    if (strcmp(session->jog, question->key) != 0) {
+        session->is_down = !has_room(session, setup, question->way_mm);
+    }
+    way.way_mm = session->is_down ? -way.way_mm : way.way_mm;
+    return move(session, &way, where_up, "z", RISE_MM_S, result);
+}
+
+bool setup_motion_tilt(setup_session_t *session, const setup_t *setup, const setup_question_t *question,
+                       char result[SETUP_ANSWER_MAX])
+{
+    return setup_session_need_torque(session, setup, question->stage) && home(session) &&
+           move(session, question, where_tilted, question->index <= 2u ? "pitch" : "roll", TILT_DEG_S, result);
+}
+
+/* Whether heaved has stopped all because of one cylinder, and which. */
+static bool find_stopped(setup_session_t *session, char result[SETUP_ANSWER_MAX])
+{
+    double actual_mm[SETUP_DRIVES_MAX] = {0};
+    cJSON *status = heaved_link_ask(&session->link, "status");
+    const cJSON *fault = cJSON_GetObjectItemCaseSensitive(status, "fault");
+    const unsigned axis = (unsigned)heaved_link_number(fault, "axis");
+    const bool is_fault = strcmp(heaved_link_text(status, "state"), "FAULT") == 0 && axis >= 1u && axis <= SETUP_DRIVES_MAX;
+    cJSON_Delete(status);
+    if (!is_fault || setup_session_counts(session, NULL, actual_mm) < axis) {
+        return false;
+    }
+    (void)snprintf(result, SETUP_ANSWER_MAX, "stopped %u %.1f", axis, actual_mm[axis - 1u]);
+    return true;
+}
+
+/* Whether a cylinder stands where there is no way left. */
+static bool stands_at_end(setup_session_t *session, const setup_t *setup, bool is_in)
+{
+    double actual_mm[SETUP_DRIVES_MAX] = {0};
+    bool is = false;
+    const unsigned count = setup_session_counts(session, NULL, actual_mm);
+    for (unsigned i = 0; i < count; i++) {
+        is = is || (is_in ? actual_mm[i] < END_MM : actual_mm[i] > configure_stroke(setup, i + 1u) - END_MM);
+    }
+    return is;
+}
+
+/* The key may be let go in between, as often as somebody likes. */
+bool setup_motion_ends(setup_session_t *session, const setup_t *setup, const setup_question_t *question,
+                       char result[SETUP_ANSWER_MAX])
+{
+    char request[64];
+    (void)snprintf(request, sizeof request, "jog z %g %g", question->way_mm < 0 ? -RISE_MM_S : RISE_MM_S, FAR_MM);
+    if (!setup_session_need_torque(session, setup, question->stage) || !home(session)) {
+        return false;
+    }
+    for (bool is_there = stands_at_end(session, setup, question->way_mm < 0); !is_there;) {
+        press_t press = {false};
+        const hold_watch_t watch = {is_let_go, &press};
+        if (!hold(session, request, &watch)) {
+            return find_stopped(session, result);
+        }
+        is_there = !press.is_let_go;
+    }
+    pause_ms(SETTLE_MS);
+    (void)snprintf(result, SETUP_ANSWER_MAX, "there");
+    return true;
 }
 
 /* --- Relays and switches --- */

@@ -13,6 +13,6 @@ typedef bool setup_motion_t(setup_session_t *session, const setup_t *setup, cons
                             char result[SETUP_ANSWER_MAX]);
 
 setup_motion_t setup_motion_jog, setup_motion_home, setup_motion_counts, setup_motion_same, setup_motion_pose, setup_motion_rise,
-    setup_motion_relay, setup_motion_switch;
+    setup_motion_tilt, setup_motion_ends, setup_motion_relay, setup_motion_switch;
 
 #endif

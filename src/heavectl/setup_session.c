@@ -401,7 +401,11 @@ static bool enter_service(setup_session_t *self)
             return true;
         }
         if (is_estop && heaved_link_now_ms() - self->started_ms > SETTLED_MS) {
-            return fail(self, _("the e-stop is pressed: release it first, then try again"), "");
+            return fail(self,
+                        _("the e-stop is pressed: release it first, then try again. Where it is released, its line is another "
+                          "one, or its contact of "
+                          "the other kind: \"back\""),
+                        "");
         }
         if (!is_estop) {
             (void)heaved_link_has_done(&self->link, is_fault ? "reset" : "service", error);

@@ -26,6 +26,7 @@ typedef struct {
     char error[SETUP_TEXT_MAX];    /**< of the last call that returned false */
     char jog[SETUP_KEY_MAX];       /**< the step whose way has been begun, and where */
     double jog_from;
+    bool is_down; /**< the rise goes down: there is no room above */
 } setup_session_t;
 
 /** Makes the folder. @return false: see error */

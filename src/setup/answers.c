@@ -101,6 +101,7 @@ unsigned answers_list(const char *text, double *number, unsigned most)
         }
         count++;
         end += strspn(end, " \t");
+        end += *end == '/' ? strcspn(end, ",") : 0; /* "3/0x1A2B": what belongs to it */
         text = *end == ',' ? end + 1 : NULL;
     }
     return count;

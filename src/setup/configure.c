@@ -237,12 +237,45 @@ static void permute_key(const setup_t *self, const legs_t *legs, const char *ans
     }
 }
 
+/* The serial number that a drive has told in the scan, as text; NULL: none. */
+static const char *serial_of(const setup_t *self, double node)
+{
+    for (const char *at = setup_get(self, "scan"); at != NULL; at = strchr(at, ','), at = at != NULL ? at + 1 : NULL) {
+        char *end = NULL;
+        if (fabs(strtod(at, &end) - node) < 0.5 && end != at) {
+            return *end == '/' ? end + 1 : NULL;
+        }
+    }
+    return NULL;
+}
+
+/* So that a drive that is exchanged later is seen. Where none tells its number, what the file has goes with the drives. */
+static void set_serials(const setup_t *self, const legs_t *legs, ini_text_t *out)
+{
+    double node[CYLINDERS];
+    char value[INI_VALUE_MAX] = "";
+    size_t length = 0;
+    bool is_any = false;
+    const unsigned count = answers_list(setup_get(self, "nodes"), node, CYLINDERS);
+    for (unsigned i = 0; i < legs->count && legs->drive[i] < count; i++) {
+        const char *serial = serial_of(self, node[legs->drive[i]]);
+        is_any = is_any || serial != NULL;
+        length += (size_t)snprintf(&value[length], sizeof value - length, "%s%.*s", i > 0 ? ", " : "",
+                                   serial != NULL ? (int)strcspn(serial, ",") : 1, serial != NULL ? serial : "0");
+    }
+    if (is_any) {
+        ini_text_set(out, "cia402", "serial_numbers", value, _("so that no drive is exchanged unnoticed"));
+    } else {
+        permute_key(self, legs, NULL, "cia402", "serial_numbers", out);
+    }
+}
+
 static void set_addresses(const setup_t *self, const legs_t *legs, ini_text_t *out)
 {
     const char *hosts = setup_get(self, "hosts");
     if (is_driver(self, "cia402")) {
         permute_key(self, legs, "nodes", "cia402", "nodes", out);
-        permute_key(self, legs, NULL, "cia402", "serial_numbers", out);
+        set_serials(self, legs, out);
     } else if (is_driver(self, "modbus-rtu")) {
         permute_key(self, legs, "nodes", "modbus", "units", out);
     } else if (hosts != NULL && strchr(hosts, ',') != NULL) {
@@ -423,6 +456,8 @@ void setup_configure(const setup_t *self, setup_stage_t stage, const double *cou
     }
     if (stage == SETUP_STAGE_GEOMETRY && answers_is(self, "start", "none")) {
         ini_text_set(out, "drives", "driver", "sim", NULL);
+        ini_text_drop(out, "drives", "lead_mm"); /* which the template of other drives leaves to be filled in */
+        ini_text_drop(out, "drives", "counts_per_turn");
     }
     if (stage == SETUP_STAGE_FULL) {
         if (answers_is(self, "limits.take", "y")) {

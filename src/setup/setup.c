@@ -14,7 +14,7 @@
 #include "setup/pictures.h"
 #include "setup/steps.h"
 
-static const step_t *const k_chapters[] = {steps_geometry, steps_drives, steps_legs, steps_zero, steps_end};
+static const step_t *const k_chapters[] = {steps_geometry, steps_drives, steps_legs, steps_zero, steps_end, steps_moves};
 #define CHAPTERS (sizeof k_chapters / sizeof k_chapters[0])
 
 static unsigned times_of(const setup_t *self, const step_t *step)

@@ -46,16 +46,19 @@ typedef enum {
     SETUP_ACT_NONE,
     SETUP_ACT_START,  /**< look up the file that answer "start" names: "hexapod" or the like, and the driver, as that file says */
     SETUP_ACT_CHECK,  /**< heaved --check: "right", "exchanged A B" (joints), else "wrong" */
-    SETUP_ACT_SCAN,   /**< who is on the bus: addresses, separated by commas */
+    SETUP_ACT_SCAN,   /**< who is on the bus: addresses, separated by commas; behind one its serial number, "3/0x1A2B" */
     SETUP_ACT_JOG,    /**< drive `index`, by `way_mm`, held: how far it went by its own count */
     SETUP_ACT_HOME,   /**< all drives find their zero, held: "homed" */
     SETUP_ACT_COUNTS, /**< what the drives count, separated by commas */
-    SETUP_ACT_SAME,   /**< "same" where they still count what answer "zero.counts" says, else "moved" */
+    SETUP_ACT_SAME,   /**< "same" where they still count what "zero.counts" (or "supply.counts") says, else "moved" */
     SETUP_ACT_POSE,   /**< where heaved takes the platform to be: six numbers */
     SETUP_ACT_LIMITS, /**< the limits that heaved suggests are shown: "shown" */
     SETUP_ACT_RELAY,  /**< relay `index`, held: "switched" */
     SETUP_ACT_SWITCH, /**< the person works a switch of `index` (below), and heaved sees it: "seen", or "not seen" */
-    SETUP_ACT_RISE,   /**< up by `way_mm`, held: how far */
+    SETUP_ACT_RISE,   /**< up by `way_mm`, or down where there is no room, held: how far */
+    SETUP_ACT_TILT,   /**< by `way_mm` in degrees, held; `index` 1 and 2: pitch, 3 and 4: roll: how far */
+    SETUP_ACT_ENDS,   /**< all cylinders as far as they may go, held; in where `way_mm` is below 0: "there", or "stopped K MM":
+                           cylinder K did not follow beyond that extension */
     SETUP_ACT_WRITE   /**< the file and the report are written: "written" */
 } setup_act_t;
 

@@ -26,6 +26,7 @@ static const struct {
     {"interface", N_("Interface")},
     {"hosts", N_("Hosts")},
     {"device", N_("Serial port")},
+    {"scan", N_("Drives that answer, with serial numbers")},
     {"nodes", N_("Addresses, in the order of the drives")},
     {"turn", N_("Counts of a turn")},
     {"gear", N_("Gear")},
@@ -42,6 +43,9 @@ static const struct {
     {"relay", N_("Relays")},
     {"switch", N_("Switches")},
     {"rise", N_("First rise")},
+    {"supply", N_("Counts before and after the supply was off")},
+    {"tilt", N_("Tilted to the front and to the right")},
+    {"ends", N_("To the ends of the cylinders")},
 };
 
 /* "legs", "legs.way.3" but not "legsomething". */

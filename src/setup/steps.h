@@ -25,6 +25,6 @@ typedef struct {
 } step_t;
 
 /** One chapter after the other; each ends with a row without a key. */
-extern const step_t steps_geometry[], steps_drives[], steps_legs[], steps_zero[], steps_end[];
+extern const step_t steps_geometry[], steps_drives[], steps_legs[], steps_zero[], steps_end[], steps_moves[];
 
 #endif

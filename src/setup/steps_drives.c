@@ -101,16 +101,24 @@ static bool check_hosts(const setup_t *self, unsigned index, const char *text, c
 
 /* --- Who is there --- */
 
+/* Those that were found, without what belongs to each. */
+static void list_found(const double *found, unsigned count, char list[SETUP_ANSWER_MAX])
+{
+    size_t length = 0;
+    list[0] = '\0';
+    for (unsigned i = 0; i < count && length < SETUP_ANSWER_MAX - 8u; i++) {
+        length += (size_t)snprintf(&list[length], SETUP_ANSWER_MAX - length, "%s%g", i > 0 ? "," : "", found[i]);
+    }
+}
+
 static void say_nodes(const setup_t *self, setup_question_t *out)
 {
     double found[127];
-    const char *list = setup_get(self, "scan");
-    const unsigned count = answers_list(list, found, 127), wanted = setup_cylinders(self);
+    char list[SETUP_ANSWER_MAX];
+    const unsigned count = answers_list(setup_get(self, "scan"), found, 127), wanted = setup_cylinders(self);
+    list_found(found, count, list);
     if (count >= wanted) {
-        size_t length = 0;
-        for (unsigned i = 0; i < wanted; i++) {
-            length += (size_t)snprintf(&out->fallback[length], sizeof out->fallback - length, "%s%g", i > 0 ? "," : "", found[i]);
-        }
+        list_found(found, wanted, out->fallback);
         (void)snprintf(out->text, sizeof out->text,
                        _("%u drives answer: %s. Which of them are drives 1 to %u? Their order does not matter yet.\n"
                          "\"a\" looks again."),
@@ -128,6 +136,7 @@ static bool check_nodes(const setup_t *self, unsigned index, const char *text, c
 {
     double number[16], found[127];
     const unsigned wanted = setup_cylinders(self), count = answers_list(text, number, 16);
+    char list[SETUP_ANSWER_MAX];
     const unsigned there = answers_list(setup_get(self, "scan"), found, 127);
     (void)index;
     if (strcmp(text, "a") == 0) {
@@ -150,8 +159,9 @@ static bool check_nodes(const setup_t *self, unsigned index, const char *text, c
             }
         }
         if (!is_there) {
+            list_found(found, there, list);
             (void)snprintf(error, SETUP_ERROR_MAX, _("nobody answers at %g; allowed are those that do: %s"), number[i],
-                           there > 0 ? setup_get(self, "scan") : _("none"));
+                           there > 0 ? list : _("none"));
             return false;
         }
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * steps_end.c - limits, relays, switches, the first rise, and the file.
+ * steps_end.c - limits, relays and switches.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,8 +9,6 @@
 #include "setup/answers.h"
 #include "setup/configure.h"
 #include "setup/steps.h"
-
-#define RISE_MM 20.0
 
 static bool has_file(const setup_t *self)
 {
@@ -100,50 +98,49 @@ static void say_switch(const setup_t *self, setup_question_t *out)
     (void)self;
     (void)snprintf(out->text, sizeof out->text, "%s", _(k_work[out->index - 1u]));
 }
-static void accept_switch(setup_t *self, unsigned index, const char *text)
+static bool is_unseen(const setup_t *self, unsigned index)
+{
+    const char *seen = answers_get_nth(self, "switch", index);
+    return is_connected(self, index) && seen != NULL && strcmp(seen, "seen") != 0;
+}
+static void say_unseen(const setup_t *self, setup_question_t *out)
+{
+    (void)snprintf(out->text, sizeof out->text,
+                   _("heaved has not seen the switch %s. Its line may be another one, its wire broken or loose, or its contact "
+                     "of the other kind."),
+                   k_switch[out->index - 1u]);
+    out->choices = if_switch_lines(self) ? N_("a try again|l name the lines again|n note it, and go on without it")
+                                         : N_("a try again|n note it, and go on without it");
+}
+static void accept_unseen(setup_t *self, unsigned index, const char *text)
 {
     char note[SETUP_ANSWER_MAX];
-    if (strcmp(text, "seen") != 0) {
-        (void)snprintf(note, sizeof note, N_("heaved did not see the switch %s."), k_switch[index - 1u]);
-        answers_note(self, note);
+    (void)snprintf(note, sizeof note, N_("heaved did not see the switch %s."), k_switch[index - 1u]);
+    answers_note(self, note);
+    if (strcmp(text, "l") == 0) {
+        answers_drop(self, "switches.");
+        (void)answers_set(self, "switches.kind", "g");
+        answers_drop(self, "switch.");
+    } else if (strcmp(text, "a") == 0) {
+        (void)snprintf(note, sizeof note, "switch.%u", index);
+        answers_drop(self, note);
+        (void)snprintf(note, sizeof note, "switch.wrong.%u", index);
+        answers_drop(self, note);
     }
 }
 
-/* --- The first rise --- */
-
-static unsigned if_rising(const setup_t *self)
+/* Drives that move, and nothing that tells heaved of the e-stop. */
+static unsigned if_bare(const setup_t *self)
 {
-    return answers_is(self, "rise.ready", "y");
+    return strcmp(setup_driver(self), "sim") != 0 && !configure_has_switch(self, k_switch[0]);
 }
-static void say_rise(const setup_t *self, setup_question_t *out)
-{
-    (void)self;
-    out->way_mm = RISE_MM;
-    (void)snprintf(out->text, sizeof out->text, _("The platform rises by %g mm."), RISE_MM);
-}
-static void say_risen(const setup_t *self, setup_question_t *out)
-{
-    (void)snprintf(out->text, sizeof out->text, _("Has it risen by %.1f mm, straight up?"), answers_number(self, "rise.way", 0));
-}
-static void accept_risen(setup_t *self, unsigned index, const char *text)
+static void accept_bare(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     if (strcmp(text, "n") == 0) {
-        answers_note(self, N_("The platform did not rise level: the cylinders were measured again."));
-        answers_drop(self, "zero.counts");
-        answers_drop(self, "zero.length.");
-        answers_drop(self, "zero.same");
-        answers_drop(self, "zero.pose");
-        answers_drop(self, "zero.right");
-        answers_drop(self, "rise.");
-    }
-}
-
-static void accept_write(setup_t *self, unsigned index, const char *text)
-{
-    (void)index;
-    if (strcmp(text, "y") != 0) {
-        answers_drop(self, "write");
+        answers_drop(self, "switches.");
+    } else {
+        answers_note(self, N_("heaved is not told of the e-stop."));
     }
 }
 
@@ -191,33 +188,31 @@ const step_t steps_end[] = {
      .text = N_("Has relay %u, and no other, switched and gone back?"),
      .took = accept_relay,
      .choices = N_("y yes|n no: note it, and go on|a try again")},
+    {.key = "switches.bare",
+     .kind = SETUP_CHOICE,
+     .times = if_bare,
+     .took = accept_bare,
+     .text =
+         N_("Nothing tells heaved of the e-stop. The e-stop still has to take the power from the drives by itself; but when it "
+            "is released, heaved does not know that it was pressed, and an operator's engage is all that is needed to move. Is "
+            "it meant so?"),
+     .choices = N_("n no: name its line|y yes: note it")},
     {.key = "switch",
      .kind = SETUP_DO,
+     .group = 4,
      .times = switches,
      .is_repeated = true,
      .applies = is_connected,
      .act = SETUP_ACT_SWITCH,
      .stage = SETUP_STAGE_FULL,
-     .say = say_switch,
-     .took = accept_switch},
-    {.key = "rise.ready",
+     .say = say_switch},
+    {.key = "switch.wrong",
      .kind = SETUP_CHOICE,
-     .text = N_("Now the first rise, by 20 mm, while you hold a key. Nobody is on the platform or near it, and the e-stop is in "
-                "your other hand?"),
-     .choices = N_("y yes|s leave it out")},
-    {.key = "rise.way", .kind = SETUP_DO, .times = if_rising, .act = SETUP_ACT_RISE, .stage = SETUP_STAGE_FULL, .say = say_rise},
-    {.key = "rise.right",
-     .kind = SETUP_CHOICE,
-     .times = if_rising,
-     .say = say_risen,
-     .took = accept_risen,
-     .choices = N_("y yes|n no: measure the cylinders again")},
-    {.key = "write",
-     .kind = SETUP_CHOICE,
-     .text = N_("That is all. Write the configuration, and the report beside it?"),
-     .choices = N_("y yes"),
-     .took = accept_write,
-     .help = N_("\"quit\" leaves without writing; all answers stay, and setup goes on here.")},
-    {.key = "written", .kind = SETUP_DO, .act = SETUP_ACT_WRITE, .stage = SETUP_STAGE_FULL},
+     .group = 4,
+     .times = switches,
+     .is_repeated = true,
+     .applies = is_unseen,
+     .say = say_unseen,
+     .took = accept_unseen},
     {.key = NULL},
 };

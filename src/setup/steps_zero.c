@@ -93,6 +93,7 @@ static void accept_pose(setup_t *self, unsigned index, const char *text)
         answers_drop(self, "zero.length.");
         answers_drop(self, "zero.same");
         answers_drop(self, "zero.pose");
+        answers_drop(self, "zero.right");
     }
 }
 

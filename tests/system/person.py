@@ -23,7 +23,7 @@ READS_S = 0.2  # what the screen asks for, before the key
 MARKS = {"Waiting for it; s and Enter: it is not seen.": "waiting", "Relay %u switches while a key is held.": "relay",
          "Drive %u: by %g mm, outwards. Look which cylinder moves, which way, and how far.": "way",
          "Cylinder %u: by %.1f mm, inwards, to where it stood before.": "way", "Cylinder %u: by %.1f mm, outwards, to where it stood before.": "way",
-         "The platform rises by %g mm.": "way", "hold a key, the space bar for one; q ends": "hold", "goes on while the key is held": "goes on",
+         "The platform rises by %g mm, or sinks where there is no room above it.": "way", "The plate tilts by %g degrees.": "way", "The plate goes back, level.": "way", "hold a key, the space bar for one; q ends": "hold", "goes on while the key is held": "goes on",
          "let go; hold a key to go on, q to end": "goes on", "stopped: let go of the key and hold it again": "stopped",
          "let go of the key first, then hold the space bar; q ends": "stopped", "let go": "let go",
          "there: let go of the key": "let go", "home has ended; heavectl counts shows what is homed": "let go"}
@@ -44,6 +44,12 @@ class Eyes:
     def plate(self):
         roll, pitch, yaw, x, y, z = self.twin.pose.values()
         return [z + self.zero_height, x, y, roll, pitch, yaw]
+
+
+    def lowest(self):
+        """The hour at which the plate is lowest, with 12 at the front: positive pitch lowers the front, positive roll the left."""
+        roll, pitch = self.plate()[3:5]
+        return round(math.degrees(math.atan2(-roll, pitch)) / 30) % 12 or 12
 
 
 class Person:
@@ -87,7 +93,7 @@ class Person:
 
     def has_risen(self, way):
         up, *others = (now - then for now, then in zip(self.plate_now, self.plate_then))
-        return abs(up - way) < 0.5 and max(map(abs, others)) < 0.5
+        return "n" if max(map(abs, others)) > 0.5 else "y" if abs(up - way) < 0.5 else "l"
 
     def of_setup(self):
         return [(r"Which cylinder has moved", lambda _: str(self.moved()[0])),
@@ -98,7 +104,8 @@ class Person:
                 (r"How long is cylinder (\d)", lambda asked: f"{self.eyes.length(int(asked[1])):.2f}"),
                 (r"plate stands like this", lambda asked: self.plate_is_so(asked.string)),
                 (r"Has relay (\d), and no other", lambda asked: "y" if self.relays == {int(asked[1])} and self.eyes.twin.relays == [] else "n"),
-                (r"Has it risen by ([0-9.]+)", lambda asked: "y" if self.has_risen(float(asked[1])) else "n")]
+                (r"at which hour is the plate lowest", lambda _: str(self.eyes.lowest())),
+                (r"Has it (risen|sunk) by ([0-9.]+)", lambda asked: self.has_risen(float(asked[2]) * (1 if asked[1] == "risen" else -1)))]
 
     # --- Hands ---
 
@@ -160,7 +167,7 @@ class Person:
     def run(self):
         end = time.monotonic() + self.seconds
         while self.look():
-            assert time.monotonic() < end, f"not done in {self.seconds} s:\n{self.text[-3000:]}"
+            assert time.monotonic() < end, f"not done in {self.seconds} s:\n{self.text[-60000:]}"
         return self.end()
 
     def end(self):

@@ -230,6 +230,199 @@ static void test_zero_of_the_tape(void)
     say("zero.length.2", "1703");
 }
 
+static void say_each(const char *key, unsigned index, const char *text)
+{
+    char name[SETUP_KEY_MAX];
+    (void)snprintf(name, sizeof name, "%s.%u", key, index);
+    say(name, text);
+}
+
+static void look_again(void)
+{
+    for (unsigned k = 1; k <= 6u; k++) {
+        say_each("again.way", k, "-5");
+        say_each("again.right", k, "y");
+    }
+}
+
+static void measure(void)
+{
+    say("zero.counts", "0,0,0,0,0,0");
+    for (unsigned k = 1; k <= 6u; k++) {
+        say_each("zero.length", k, "1400");
+    }
+    say("zero.same", "same");
+    say("zero.pose", "0,0,0,0,0,900");
+    say("zero.right", "y");
+}
+
+static void to_rise(void)
+{
+    static const unsigned k_leg[6] = {1, 2, 3, 4, 5, 6};
+    to_legs();
+    look_at_legs(k_leg, 0, 0);
+    say("legs.verdict", "y");
+    look_again();
+    say("zero.kind", "a");
+    measure();
+    say("limits", "shown");
+    say("limits.take", "y");
+    say("relays.kind", "n");
+    say("switches.kind", "n");
+    say("switches.bare", "y");
+    say("rise.ready", "y");
+    say("rise.way", "20.0");
+    say("rise.right", "y");
+}
+
+static void to_tilts(void)
+{
+    to_rise();
+    say("supply.counts", "1,1,1,1,1,1");
+    say("supply.off", "s");
+}
+
+static void tilt(unsigned front, unsigned right)
+{
+    char hour[8];
+    say("tilt.way.1", "2.0");
+    (void)snprintf(hour, sizeof hour, "%u", front);
+    say("tilt.low.1", hour);
+    say("tilt.way.2", "-2.0");
+    say("tilt.way.3", "-2.0");
+    (void)snprintf(hour, sizeof hour, "%u", right);
+    say("tilt.low.3", hour);
+    say("tilt.way.4", "2.0");
+    TEST_ASSERT_EQUAL_STRING("tilt.verdict", next().key);
+}
+
+/* Numbers from another side, and the other way round, are known by where the plate leans, also by somebody who is an hour off. */
+static void test_front_is_found(void)
+{
+    for (unsigned thirds = 0; thirds < 3u; thirds++) {
+        for (unsigned mirrored = 0; mirrored < 2u; mirrored++) {
+            for (int off = -1; off <= 1; off++) {
+                memset(&s_setup, 0, sizeof s_setup);
+                to_tilts();
+                const int front = (int)(4u * thirds), right = mirrored != 0 ? front - 3 : front + 3;
+                tilt((unsigned)(front + off + 23) % 12u + 1u, (unsigned)(right + 23) % 12u + 1u);
+                if (thirds == 0 && mirrored == 0) {
+                    say("tilt.verdict", "");
+                    TEST_ASSERT_EQUAL_STRING("ends.way.1", next().key);
+                    continue;
+                }
+                refuse("tilt.verdict", "y", "none of the answers");
+                say("tilt.verdict", "r");
+                TEST_ASSERT_EQUAL_STRING("again.way.1",
+                                         next().key); /* each is looked at with its new number, and measured anew */
+                for (unsigned drive = 1; drive <= 6u; drive++) {
+                    /* a cylinder stands at its own hour: pairs at 12, 4 and 8; 1, 3 and 5 before, the others behind */
+                    char key[SETUP_KEY_MAX];
+                    (void)snprintf(key, sizeof key, "legs.moved.%u", drive);
+                    const int half = 8 * (int)((drive - 1u) / 2u) + (drive % 2u == 0 ? 1 : -1);
+                    const int is = mirrored != 0 ? 2 * front - half : 2 * front + half;
+                    const int turned = ((is + 1) % 24 + 24) % 24;
+                    TEST_ASSERT_EQUAL_INT(turned / 8 * 2 + (turned % 8 == 2) + 1, atoi(setup_get(&s_setup, key)));
+                }
+                look_again();
+                measure();
+                say("rise.ready", "y"); /* what was answered before stays */
+                TEST_ASSERT_EQUAL_STRING("rise.way", next().key);
+            }
+        }
+    }
+}
+
+static void test_what_leans_like_nothing_is_looked_at_again(void)
+{
+    to_tilts();
+    tilt(12, 12);
+    TEST_ASSERT_NOT_NULL(strstr(next().text, "No other numbers"));
+    refuse("tilt.verdict", "r", "none of the answers");
+    say("tilt.verdict", "a");
+    TEST_ASSERT_EQUAL_STRING("tilt.way.1", next().key);
+    tilt(6, 9); /* half a turn: no pair of cylinders stands there */
+    say("tilt.verdict", "m");
+    TEST_ASSERT_EQUAL_STRING("zero.counts", next().key);
+}
+
+static void test_encoders_without_supply(void)
+{
+    to_rise();
+    say("supply.counts", "1,1,1,1,1,1");
+    say("supply.off", "y");
+    say("supply.same", "moved");
+    say("supply.lost", "h");
+    TEST_ASSERT_EQUAL_STRING("zero.method", next().key);
+    say("zero.method", "17");
+    say("zero.home", "homed");
+    TEST_ASSERT_EQUAL_STRING("zero.counts", next().key);
+    TEST_ASSERT_EQUAL_STRING("The encoders lose their counts with the supply: the drives home after each start.",
+                             setup_get(&s_setup, "note.1") != NULL && strstr(setup_get(&s_setup, "note.1"), "encoders") != NULL
+                                 ? setup_get(&s_setup, "note.1")
+                                 : setup_get(&s_setup, "note.2"));
+}
+
+static void test_an_end_that_comes_too_early(void)
+{
+    to_tilts();
+    tilt(12, 3);
+    say("tilt.verdict", "");
+    TEST_ASSERT_TRUE(next().way_mm < 0);
+    say("ends.way.1", "there");
+    TEST_ASSERT_TRUE(next().way_mm > 0);
+    say("ends.way.2", "stopped 4 251.0");
+    TEST_ASSERT_NOT_NULL(strstr(next().text, "Cylinder 4 went no further out than to 251.0 mm of its 400 mm"));
+    say("ends.wrong.2", "a");
+    say("ends.way.1", "stopped 2 31.0");
+    TEST_ASSERT_NOT_NULL(strstr(next().text, "Cylinder 2 went no further in than to 31.0 mm of its 400 mm"));
+    say("ends.wrong.1", "s");
+    say("retracted", "1300");
+    say("stroke", "250");
+    say("geometry.check", "right");
+    say("limits", "shown");
+    say("limits.take", "y");
+    TEST_ASSERT_EQUAL_STRING("ends.way.1", next().key);
+    setup_configure(&s_setup, SETUP_STAGE_FULL, NULL, &s_text);
+    expect("geometry", "stroke_mm", "250");
+}
+
+static void test_serial_numbers_go_with_their_drives(void)
+{
+    static const unsigned k_leg[6] = {1, 5, 3, 4, 2, 6};
+    begin();
+    say("geometry", "s");
+    say("base.near", "306.18");
+    say("base.far", "1733.62 mm");
+    say("plate.near", "281.58");
+    say("plate.far", "1398.3");
+    say("sizes.ok", "y");
+    say("retracted", "1300");
+    say("stroke", "400");
+    say("geometry.check", "right");
+    say("drives", "c");
+    say("interface", "");
+    say("scan", "1/0x11,2/0x22,3,4/0x44,5/0x55,6/0x66,9/0x99");
+    TEST_ASSERT_NOT_NULL(strstr(next().text, "7 drives answer: 1,2,3,4,5,6,9."));
+    refuse("nodes", "1,2,3,4,5,7", "allowed are those that do: 1,2,3,4,5,6,9");
+    say("nodes", "9,2,3,4,5,6");
+    say("turn", "131072");
+    say("gear", "");
+    say("lead", "10");
+    say("accel", "");
+    say("speed", "");
+    say("jerk", "");
+    say("margin", "");
+    say("settled", "");
+    say("legs.ready", "y");
+    say("legs.room", "y");
+    look_at_legs(k_leg, 0, 0);
+    say("legs.verdict", "y");
+    setup_configure(&s_setup, SETUP_STAGE_LEGS, NULL, &s_text);
+    expect("cia402", "nodes", "9, 5, 3, 4, 2, 6");
+    expect("cia402", "serial_numbers", "0x99, 0x55, 0, 0x44, 0x22, 0x66");
+}
+
 static void test_back_takes_one_answer(void)
 {
     TEST_ASSERT_FALSE(setup_back(&s_setup));
@@ -294,6 +487,11 @@ int main(void)
     RUN_TEST(test_legs_end_in_the_configuration);
     RUN_TEST(test_a_wrong_leg_is_looked_at_again);
     RUN_TEST(test_zero_of_the_tape);
+    RUN_TEST(test_front_is_found);
+    RUN_TEST(test_what_leans_like_nothing_is_looked_at_again);
+    RUN_TEST(test_encoders_without_supply);
+    RUN_TEST(test_an_end_that_comes_too_early);
+    RUN_TEST(test_serial_numbers_go_with_their_drives);
     RUN_TEST(test_back_takes_one_answer);
     RUN_TEST(test_kept_on_the_disk);
     RUN_TEST(test_ini_text);
