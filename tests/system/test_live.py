@@ -30,6 +30,8 @@ from pathlib import Path
 import harness
 import tap
 
+from heave import Twin
+
 COMMANDS = ["engage", "hold", "resume", "park", "reset", "shutdown"]
 MANUAL = {"platform__engage": "manual"}
 ELSEWHERE = {"platform__engage": "manual", "sim__start_extension_mm": "61.7", "sim__homed": "no"}
@@ -300,10 +302,12 @@ def has_no_samples(bench):
 
 def watches_on_a_small_terminal(bench):
     """24 lines of 80 columns: the line with the state stays, with a fault the fault does too, and no word is broken."""
-    text = (harness.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", "nosuch0").replace("port = 9800", f"port = {bench.port}")
-    daemon = bench.start(config=bench.file("bus.ini", text + f"\n[control]\nsocket = {bench.socket}\n"))
-    bench.ctl("engage")
-    bench.wait_state("FAULT")
+    text = (harness.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", f"twin{os.getpid() % 1000000}").replace("port = 9800", f"port = {bench.port}")
+    config = bench.file("bus.ini", text + f"\n[control]\nsocket = {bench.socket}\n")
+    with Twin(config, program=bench.bin / "heave-twin"):
+        daemon = bench.start(config=config)
+        assert bench.ctl("engage").returncode == 0
+    bench.wait_state("FAULT")  # all drives are gone
     pid, terminal = ctl_on_terminal(bench, "--for", "0.5", "watch")
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     seen = b""

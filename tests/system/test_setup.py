@@ -361,7 +361,13 @@ def relays_and_switches():
                            (r"Relays for effects|Switches of the operator", "g"), (r"Lines of relay", "LIGHT, FAN"), (r"Line of the e-stop", lambda _: next(estop)),
                            (r"Line of the enable key", of_key), (r"has not seen the switch estop", "l"), (r"Line of the reset", "RESET"), (r"Line of the contact", ""), (r"Relay \d: try it", "y"),
                            (r"the e-stop is pressed.*Enter tries again", release))
-            person.eyes, person.works = Eyes(twin, RETRACTED), {"Press the e-stop": lambda: work("estop"), "Turn the enable key": lambda: work("enable")}
+            is_unseen = iter([True, False])
+
+            def press():
+                work("estop")
+                if next(is_unseen):
+                    os.write(person.master, b"s\n")
+            person.eyes, person.works = Eyes(twin, RETRACTED), {"Press the e-stop": press, "Turn the enable key": lambda: work("enable")}
             code, screen = person.run()
         report = (folder / "alone.ini.report.txt").read_text(encoding="utf-8")
         assert "the e-stop is pressed: release it first" in re.sub(r"\s+", " ", screen), screen
