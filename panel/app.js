@@ -6,7 +6,7 @@ import { atLimits, extensionOf, nearness } from "./limits.js";
 import { Link } from "./link.js";
 import { Motion } from "./motion.js";
 import { Recorder } from "./recorder.js";
-import { chinese, putBackOf, refusalOf, switchLanguage, t } from "./text.js";
+import { chinese, noticesIn, putBackOf, refusalOf, switchLanguage, t } from "./text.js";
 import { button, element, fill, number, rowsOf, table } from "./ui.js";
 import { View } from "./view.js";
 
@@ -96,9 +96,8 @@ function faultOf(status) {
 }
 
 function noticesOf(status) {
-  const rows = [[status.estop_active, "estop"], [status.power_failing, "power"], [status.selftest.due, "due"], [status.configuration.barred, "barred"]];
   const putBack = putBackOf(status);
-  return [...rows.filter(([is]) => is).map(([, name]) => t(name)), ...(putBack ? [`${t("putBack")} ${putBack}`] : [])].map((text) => element("p", { class: "notice bad" }, text));
+  return [...noticesIn(status).map(t), ...(putBack ? [`${t("putBack")} ${putBack}`] : [])].map((text) => element("p", { class: "notice bad" }, text));
 }
 
 function senderOf(status) {

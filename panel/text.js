@@ -19,6 +19,7 @@ export const TEXT = {
   bus: ["Bus", "总线"], latency: ["Cycle", "周期"], late: ["late cycles", "迟到周期"], wake: ["wake-up 99.9 %", "唤醒 99.9 %"],
   fault: ["Fault", "故障"], cause: ["Cause", "原因"], remedy: ["Remedy", "处理方法"], onAxis: ["axis", "轴"], estop: ["The e-stop is pressed", "急停已按下"], power: ["The supply is failing", "电源即将断电"],
   due: ["A self-test is due: heavectl selftest", "需要自检：heavectl selftest"], barred: ["This is not the approved configuration", "当前配置未经批准"],
+  slowRise: ["Nobody has seen this machine rise as it is configured now: it rises at a tenth of engage speed. Look, then: heavectl commissioned", "还没有人看过机器按当前配置升起：以投入速度的十分之一升起。看过之后运行 heavectl commissioned"],
   putBack: ["The configuration that was applied could not be started; the one before it is in force again:", "应用的配置无法启动，已恢复之前的配置："],
   machine: ["The machine", "机器"], picture: ["The platform: drag to turn it", "平台：拖动可旋转"], ghost: ["asked for", "要求的位姿"], closeToEnd: ["10 % from an end", "距行程端点 10% 以内"], atEnd: ["at an end", "到达行程端点"],
   legend: ["Numbers: how far a cylinder is out, mm. Arrow keys or a finger turn the picture.", "数字：各电动缸的伸出量，mm。可用方向键或手指旋转画面。"], nearEnd: ["Cylinders near an end of their stroke", "接近行程端点的电动缸"], limitOf: ["Axes at their limit", "到达限位的轴"], farFromLimits: ["All cylinders and axes are away from their limits.", "各电动缸和各轴均未接近限位。"],
@@ -88,6 +89,9 @@ export const t = (name) => TEXT[name]?.[language] ?? name;
 export const refusalOf = (got) => (chinese() ? got.error_zh : null) ?? got.error ?? (got.answer?.ok === false ? got.answer.error : null);
 // Why the configuration that was applied last is not in force; "": it is.
 export const putBackOf = (status) => (chinese() ? status?.configuration.put_back_zh : null) ?? status?.configuration.put_back ?? "";
+// What people have to know before anything else.
+export const noticesIn = (status) => [[status.estop_active, "estop"], [status.power_failing, "power"], [status.selftest.due, "due"], [status.configuration.barred, "barred"],
+  [status.configuration.slow_rise, "slowRise"]].filter(([is]) => is).map(([, name]) => name);
 export function switchLanguage() {
   language = 1 - language;
   store.set("heave-language", String(language));

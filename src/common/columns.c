@@ -51,13 +51,17 @@ static bool is_one_of(const char *text, const char *const *marks, size_t count)
     return false;
 }
 
-bool columns_may_break(const char *previous, const char *text)
+bool columns_is_closing(const char *text)
 {
     static const char *const k_closing[] = {"，", "。", "、", "；", "：", "？", "！", "）", "”", "’", "》",
                                             "】", "…",  ",",  ".",  ";",  ":",  ")",  "]",  "%", "?"};
+    return is_one_of(text, k_closing, sizeof k_closing / sizeof k_closing[0]);
+}
+
+bool columns_may_break(const char *previous, const char *text)
+{
     static const char *const k_opening[] = {"（", "“", "‘", "《", "【", "(", "["};
-    if (previous == NULL || is_one_of(text, k_closing, sizeof k_closing / sizeof k_closing[0]) ||
-        is_one_of(previous, k_opening, sizeof k_opening / sizeof k_opening[0])) {
+    if (previous == NULL || columns_is_closing(text) || is_one_of(previous, k_opening, sizeof k_opening / sizeof k_opening[0])) {
         return false;
     }
     return columns_glyph(previous).columns == 2u || columns_glyph(text).columns == 2u;

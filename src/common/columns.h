@@ -27,6 +27,9 @@ int columns_lacking(const char *text, unsigned columns);
 /** Writes a text and blanks up to so many columns. */
 void columns_put(FILE *out, const char *text, unsigned columns);
 
+/** Whether a text begins with a mark that no line begins with. */
+bool columns_is_closing(const char *text);
+
 /** Whether a line may end between what ends before `text` and what begins with it: between Chinese characters, but not in front
  *  of a closing mark nor behind an opening one. Blanks are the caller's.
  *  @param previous the character before, NULL at the beginning */

@@ -80,6 +80,7 @@ static service_answer_t serve(motion_loop_t *self, const motion_request_t *reque
 static hv_status_t hold(motion_loop_t *self)
 {
     self->current.view.held_tick_us = gateway_tick_age(&self->session.gateway, 0);
+    self->current.view.hold_late_cycles = 0;
     if (!delayed_end_hold(&self->end)) {
         return HV_ERR_STATE;
     }
@@ -245,6 +246,7 @@ static void withhold_permits(motion_loop_t *self, switches_change_t change, uint
     }
     if (response != EVENTS) {
         (void)!ask(self, response);
+        self->current.view.hold_late_cycles = response == EVENT_HOLD ? late_cycles : self->current.view.hold_late_cycles;
     }
 }
 

@@ -151,10 +151,12 @@ static bool is_enough(const char *argument, int words)
     return words >= least && words <= words_in(argument);
 }
 
-/* Takes the units off speed and way: heaved knows them by the axis. */
-static void drop_units(char *words)
+/* Takes the units off speed and way: heaved knows them by the axis.
+ * Returns 'm' or 'd' as they began, '?' where there were both, '\0' where there were none. */
+static int drop_units(char *words)
 {
     static const char *const k_units[] = {"mm/s", "deg/s", "mm", "deg"};
+    int seen = '\0';
     char *to = words;
     const char *word = words;
     for (bool is_last = *word == '\0'; !is_last;) {
@@ -164,12 +166,14 @@ static void drop_units(char *words)
             const size_t unit = strlen(k_units[i]);
             kept -= length > unit && memcmp(&word[length - unit], k_units[i], unit) == 0 ? unit : 0;
         }
+        seen = kept == length ? seen : seen != '\0' && seen != word[kept] ? '?' : word[kept];
         is_last = word[length] == '\0';
         memmove(to, word, kept);
         to += kept;
         word += length + 1u;
         *to++ = is_last ? '\0' : ' ';
     }
+    return seen;
 }
 
 /* Words that follow the command, with one blank between. */
@@ -270,7 +274,7 @@ const char *ctl_parse_command(ctl_t *self, int argc, char **argv)
     }
     self->command = row->name;
     if (strcmp(row->name, "jog") == 0) {
-        drop_units(self->words);
+        self->unit = drop_units(self->words);
     }
     return NULL;
 }

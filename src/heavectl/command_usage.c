@@ -167,7 +167,8 @@ static const usage_section_t k_manual[] = {
      N_("`heavectl setup FILE` needs no heaved: it starts one of its own, in service, on the configuration in the making, which "
         "ends "
         "with it. Every answer is kept in FILE.setup at once, and setup goes on there, whatever ended it. It writes FILE, with "
-        "comments, and FILE.report.txt in the end, when it is told to. /usr/share/doc/heave/docs/commissioning.md\n")},
+        "comments, and FILE.report.txt, .html and .json in the end, when it is told to. "
+        "/usr/share/doc/heave/docs/commissioning.md\n")},
     {N_("DRIVES"),
      N_("`heavectl drive 3` shows what heaved sees of a drive and, of CANopen drives in OFF, SERVICE, FAULT and ESTOP, what its "
         "own "

@@ -18,7 +18,8 @@
 typedef struct {
     const char *command;
     const char *argument; /**< what follows the command, one blank between words; NULL: nothing */
-    char words[128];      /**< of that */
+    char words[128];      /**< of that, without units */
+    int unit;             /**< 'm' or 'd', which these were in; '?' both, '\0' none was given */
     const char *socket;   /**< NULL = not named */
     const char *platform; /**< NULL = not named */
     char path[SOCKET_PATH_MAX];

@@ -186,9 +186,9 @@ static bool has_ended(const ctl_t *self, const cJSON *status, int *code)
         return true;
     }
     if (strcmp(state, "HOLD") == 0) {
-        *code = ctl_complain(EXIT_REFUSED,
-                             "%s: the platform was put on hold, by somebody or because heaved was late; heavectl resume goes on",
-                             self->command);
+        char shown[SENTENCE_MAX];
+        *code = ctl_complain(EXIT_REFUSED, "%s: the platform was put on hold: %s; heavectl resume goes on", self->command,
+                             sentence(text_of(status, "hold_reason"), shown, sizeof shown));
         return true;
     }
     return false;
@@ -276,9 +276,45 @@ static int watch_counts(ctl_t *self)
 
 /* --- By hand --- */
 
+/* Whether an axis is led in degrees, as heaved has it where it is a number. Returns 'm' or 'd'; '\0': there is no such axis. */
+static int unit_of(ctl_t *self, const char *axis)
+{
+    static const char *const k_turned[] = {"roll", "pitch", "yaw"}, *const k_led[] = {"x", "y", "z"};
+    for (size_t i = 0; i < sizeof k_led / sizeof k_led[0]; i++) {
+        if (strcmp(axis, k_turned[i]) == 0 || strcmp(axis, k_led[i]) == 0) {
+            return strcmp(axis, k_turned[i]) == 0 ? 'd' : 'm';
+        }
+    }
+    const char *line = ctl_send(self, "geometry") == EXIT_DONE ? ctl_receive(self, ctl_now_ms() + ANSWER_MS) : NULL;
+    cJSON *geometry = line != NULL ? cJSON_Parse(line) : NULL;
+    const int cylinders = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(geometry, "base_mm"));
+    cJSON_Delete(geometry);
+    const long number = strtol(axis, NULL, 10);
+    return number < 1 || cylinders == 0 ? '\0' : number <= cylinders ? 'm' : 'd';
+}
+
+/* Degrees for a cylinder, or mm for a rotation, come from somebody who means another axis. */
+static int check_unit(ctl_t *self)
+{
+    char axis[16];
+    (void)snprintf(axis, sizeof axis, "%.*s", (int)strcspn(self->argument, " "), self->argument);
+    const int is = self->unit == '\0' ? '\0' : unit_of(self, axis);
+    if (is == '\0' || is == self->unit) {
+        return EXIT_DONE;
+    }
+    return ctl_complain(EXIT_BAD_USAGE,
+                        is == 'm' ? N_("jog %s: this axis moves in mm, not in degrees")
+                                  : N_("jog %s: this axis turns in degrees, not in mm"),
+                        axis);
+}
+
 static int hold(ctl_t *self)
 {
     char request[160];
+    const int wrong = check_unit(self);
+    if (wrong != EXIT_DONE) {
+        return wrong;
+    }
     ctl_catch_signals();
     (void)snprintf(request, sizeof request, "%s %s", self->command, self->argument);
     return hold_run(self->fd, request, NULL, &ctl_is_interrupted);

@@ -279,7 +279,7 @@ static bool act_write(setup_session_t *session, const setup_t *setup, const char
 {
     static ini_text_t config;
     static atomic_file_t out;
-    char report[4096], when[64], exchanged[SETUP_ANSWER_MAX];
+    char report[SETUP_PATH_MAX], when[64], exchanged[SETUP_ANSWER_MAX];
     const char *const options[] = {"--check", NULL};
     const time_t now = time(NULL);
     struct tm local;
@@ -297,8 +297,7 @@ static bool act_write(setup_session_t *session, const setup_t *setup, const char
         return false;
     }
     (void)strftime(when, sizeof when, "%Y-%m-%d %H:%M", localtime_r(&now, &local));
-    (void)snprintf(report, sizeof report, "%s.report.txt", file);
-    if (!setup_write_report(setup, report, file, when)) {
+    if (!setup_write_report(setup, file, when, report)) {
         (void)snprintf(session->error, sizeof session->error, "%.1000s: %s", report, error_text(errno));
         return false;
     }
@@ -312,7 +311,7 @@ static bool act_write(setup_session_t *session, const setup_t *setup, const char
         return false;
     }
     (void)snprintf(result, SETUP_ANSWER_MAX, "written");
-    printf(_("Written: %s, and the report %s\n"), file, report);
+    printf(_("Written: %s, and the report %s (.html to print, .json for programs)\n"), file, report);
     return true;
 }
 

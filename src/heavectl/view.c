@@ -56,6 +56,12 @@ static void draw_head(view_t *self, const cJSON *status)
     view_put_piece(self, "  cycle %.0f us  up %.0f s  late %.0f", view_number(status, "cycle_us"), up_s,
                    view_number(status, "late_cycles"));
     view_end_line(self);
+    if (strcmp(view_word(status, "state"), "HOLD") == 0 && !is_silent) {
+        char shown[SENTENCE_MAX];
+        view_put_padded(self, _("on hold"), LABEL_COLUMNS);
+        view_put(self, " %s", sentence(view_word(status, "hold_reason"), shown, sizeof shown));
+        view_end_line(self);
+    }
 }
 
 /* A row of six axes; per is what the keys have behind the unit. */

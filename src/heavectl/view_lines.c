@@ -165,12 +165,18 @@ void view_put_words(view_t *self, const cJSON *object, const char *name)
 void view_put_piece(view_t *self, const char *format, ...)
 {
     char piece[LINE_BYTES_MAX];
+    const char *rest = piece;
     va_list arguments;
     va_start(arguments, format);
     (void)vsnprintf(piece, sizeof piece, translate(format), arguments);
     va_end(arguments);
     if (self->columns + columns_of(piece) > self->style->columns) {
+        if (columns_is_closing(piece)) { /* the mark that joins it stays where it is */
+            const glyph_t mark = columns_glyph(piece);
+            put_glyph(self, piece, mark);
+            rest += mark.bytes + strspn(&piece[mark.bytes], " ");
+        }
         wrap(self);
     }
-    view_put_prose(self, piece);
+    view_put_prose(self, rest);
 }

@@ -27,6 +27,7 @@ typedef struct {
     bool is_shutting_down;
     bool is_end_held;                        /**< a hold delays the end that a signal has asked for */
     uint64_t held_tick_us;                   /**< tick of the last hold: who has heard an earlier one did not know of it */
+    uint32_t hold_late_cycles;               /**< of the last hold: so many cycles were late; 0: somebody has asked for it */
     uint32_t own_holds;                      /**< how often heaved has held by itself because it was late */
     char bus_trouble[BUS_TROUBLE_SIZE];      /**< what is wrong with the drives' bus now, "" = nothing */
     char bus_last_trouble[BUS_TROUBLE_SIZE]; /**< what was last, "" = nothing so far */

@@ -7,6 +7,7 @@
 
 #include "common/build_id.h"
 #include "common/decimal.h"
+#include "common/translate.h"
 #include "heave/motion.h" // MOTION_CLAMPED and its kin
 #include "service/report_json.h"
 #include "service/service_json.h"
@@ -127,16 +128,34 @@ static bool is_waiting_for_sender(const snapshot_t *s)
     return s->last_frame_us == 0 && (s->state == STATE_ENGAGED || s->is_held_by_silence);
 }
 
-static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down)
+static void write_hold_reason(json_t *json, const motion_view_t *view)
 {
+    const snapshot_t *s = &view->snapshot;
+    char text[64] = "";
+    if (s->state == STATE_HOLD && s->is_held_by_silence) {
+        (void)snprintf(text, sizeof text, "%s", N_("the sender is silent"));
+    } else if (s->state == STATE_HOLD && view->hold_late_cycles > 0) {
+        (void)snprintf(text, sizeof text, N_("%u cycles were late"), (unsigned)view->hold_late_cycles);
+    } else if (s->state == STATE_HOLD && s->interrupted == STATE_HOMING && view->is_shutting_down) {
+        (void)snprintf(text, sizeof text, "%s", N_("the drives were coming up when it was to end"));
+    } else if (s->state == STATE_HOLD) {
+        (void)snprintf(text, sizeof text, "%s", N_("a hold was asked for"));
+    }
+    json_text(json, "hold_reason", text);
+}
+
+static void write_state(json_t *json, const motion_view_t *view)
+{
+    const snapshot_t *s = &view->snapshot;
     json_text(json, "state", state_name(s->state));
     json_text(json, "goal", state_name(s->goal));
     json_bool(json, "held_by_silence", s->is_held_by_silence);
+    write_hold_reason(json, view);
     json_bool(json, "waiting_for_sender", is_waiting_for_sender(s));
     json_bool(json, "healthy", s->is_healthy);
     json_bool(json, "estop_active", s->is_estop_active);
     json_bool(json, "power_failing", s->is_power_failing);
-    json_bool(json, "shutting_down", is_shutting_down);
+    json_bool(json, "shutting_down", view->is_shutting_down);
     json_open(json, "service", '{');
     service_json_hand(json, s);
     json_close(json, '}');
@@ -457,7 +476,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     const snapshot_t *s = &view->snapshot;
     json_open(json, NULL, '{');
     json_bool(json, "ok", true);
-    write_state(json, s, view->is_shutting_down);
+    write_state(json, view);
     write_poses(json, s);
     write_axes(json, s, config);
     write_bus(json, view, config);

@@ -10,7 +10,7 @@
 #include "common/translate.h"
 
 #define ROUGH_MM 0.75 /* how well a way is measured beside a machine */
-#define CLEAR_MM 0.2  /* so much better than the next ratio has the right one to fit */
+#define CLEAR_MM 0.55 /* so much better than the next ratio has the right one to fit: some read whole mm */
 #define MOST     10u  /* screws and gears that were mixed up differ by small whole numbers */
 #define PARTS    5u   /* and by such as 3/2, whose parts are smaller still */
 

@@ -19,6 +19,7 @@
 #define SETUP_TEXT_MAX    2048u
 #define SETUP_ERROR_MAX   512u
 #define SETUP_DRIVES_MAX  6u
+#define SETUP_PATH_MAX    4096u
 
 typedef struct {
     char key[SETUP_KEY_MAX];
@@ -117,8 +118,9 @@ bool setup_save(const setup_t *self, const char *path);
 /** @return false: there is none (errno ENOENT), it cannot be read (errno), or it is no such file (errno EINVAL) */
 bool setup_load(setup_t *self, const char *path);
 
-/** The answers, mistakes and what was checked, for a person to print.
- *  @return false: errno says why it is not on the disk */
-bool setup_write_report(const setup_t *self, const char *path, const char *file, const char *when);
+/** The answers, mistakes and what was checked: FILE.report.json for programs, FILE.report.html to print, FILE.report.txt.
+ *  @param path out: the last of them, or that which is not on the disk
+ *  @return false: errno says why */
+bool setup_write_report(const setup_t *self, const char *file, const char *when, char path[SETUP_PATH_MAX]);
 
 #endif

@@ -129,7 +129,8 @@ static bool is_tilted(const setup_t *self, unsigned index)
 static void say_tilt(const setup_t *self, setup_question_t *out)
 {
     const bool is_out = is_tilted(self, out->index);
-    out->way_mm = out->index == TILT_FRONT || out->index == TILTS ? TILT_DEG : -TILT_DEG;
+    /* back by what it was: where there is little room, it was less than asked */
+    out->way_mm = !is_out ? -answers_number(self, "tilt.way", out->index - 1u) : out->index == TILT_FRONT ? TILT_DEG : -TILT_DEG;
     (void)snprintf(out->text, sizeof out->text, is_out ? _("The plate tilts by %g degrees.") : _("The plate goes back, level."),
                    TILT_DEG);
 }

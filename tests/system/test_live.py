@@ -94,6 +94,7 @@ def waits_for_the_end(bench):
     assert code == 1 and not out and "nothing to resume" in error, error
     assert wait("--wait", "hold")[0] == 64 and wait("--wait", "status")[0] == 64
     harness.wait_for(lambda: bench.status()["held_by_silence"], "the silence")
+    assert bench.status()["hold_reason"] == "the sender is silent", bench.status()["hold_reason"]
     status = bench.status()
     assert status["waiting_for_sender"] is True and status["pose_received"] is None and status["stream"]["period_ms"] is None, status
     assert abs(status["time_unix_ms"] / 1000 - time.time()) < 60, status["time_unix_ms"]
@@ -121,7 +122,7 @@ def waits_and_is_held(bench):
         bench.wait_state("HOMING", "RISING")
         assert bench.ctl("hold").returncode == 0
         out, error = waiting.communicate(timeout=harness.WAIT_S)
-    assert waiting.returncode == 1 and not out and "the platform was put on hold" in error, error
+    assert waiting.returncode == 1 and not out and "the platform was put on hold: a hold was asked for; heavectl resume goes on" in error, error
     assert bench.stop(daemon) == 0
 
 
@@ -420,7 +421,8 @@ def a_late_cycle_holds(bench):
         time.sleep(0.2)
         daemon.send_signal(signal.SIGCONT)
         sender.stream(0.5, wave)
-        bench.wait_state("HOLD")  # not for its silence: frames do not release it
+        held = bench.wait_state("HOLD")  # not for its silence: frames do not release it
+        assert re.fullmatch(r"\d+ cycles were late", held["hold_reason"]), held["hold_reason"]
         assert "cycles late: holding" in daemon.log.read_text()
         bench.ctl("resume")
         sender.stream(0.3, wave)

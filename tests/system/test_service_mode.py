@@ -251,6 +251,9 @@ def requests():
         run = bench.ctl("jog", "1", "5mm/s", stdin=subprocess.DEVNULL)
         assert run.returncode == 64 and "takes a terminal" in run.stderr, run
         assert bench.ctl("jog", "1").returncode == 64
+        for wrong, words in (("3 5deg/s", "jog 3: this axis moves in mm, not in degrees"), ("z 5deg/s", "moves in mm"), ("roll 2mm/s", "turns in degrees, not in mm"), ("3 5mm/s 2deg", "moves in mm")):
+            run = bench.ctl("jog", *wrong.split())
+            assert run.returncode == 64 and words in run.stderr, run
         assert bench.stop(daemon) == 0
         log = daemon.log.read_text()
         assert "OFF -> SERVICE (service)" in log and "SERVICE -> OFF (service-off)" in log, log

@@ -309,7 +309,11 @@ def exchanged_joints():
         assert code == 0 and "plate1 and plate2 look exchanged" in screen, screen
         mine = joints(Path(folder) / "alone.ini")
         assert max(abs(a - b) for name in real for a, b in zip(real[name], mine[name])) < 0.01, mine
-        assert "Joints plate1 and plate2 were exchanged." in (Path(folder) / "alone.ini.report.txt").read_text(encoding="utf-8")
+        mended = "Joints plate1 and plate2 were exchanged."
+        for ending in ("txt", "html"):
+            assert mended in (Path(folder) / f"alone.ini.report.{ending}").read_text(encoding="utf-8"), ending
+        report = json.loads((Path(folder) / "alone.ini.report.json").read_text(encoding="utf-8"))
+        assert report["found"] == [mended] and report["answers"]["kind"] == "hexapod" and report["answers"]["stroke"] == str(STROKE), report
 
 
 def misread_distance():

@@ -398,7 +398,7 @@ def late_watchdog_is_refused_in_words(bench):
     for wanted in ("would stop too late by itself when the gateway is gone (0x1001C)", "about object: 1016:01", "found: 0x7F2710, wanted: 0x7F00"):
         assert wanted in text, (wanted, text)
     table = " ".join(bench.ctl("status").stdout.split())
-    assert "node 2: refused, object 1016:01 ; would stop too late" in table and "found 0x7F2710, wanted 0x7F00" in table, table
+    assert "node 2: refused, object 1016:01; would stop too late" in table and "found 0x7F2710, wanted 0x7F00" in table, table
 
 
 def axes_of_a_node_in_their_own_words(bench):

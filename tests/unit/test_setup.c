@@ -285,14 +285,16 @@ static void to_tilts(void)
 static void tilt(unsigned front, unsigned right)
 {
     char hour[8];
-    say("tilt.way.1", "2.0");
+    say("tilt.way.1", "0.7");
     (void)snprintf(hour, sizeof hour, "%u", front);
     say("tilt.low.1", hour);
-    say("tilt.way.2", "-2.0");
-    say("tilt.way.3", "-2.0");
+    TEST_ASSERT_TRUE(fabs(next().way_mm + 0.7) < 1e-9); /* back, level */
+    say("tilt.way.2", "-0.7");
+    say("tilt.way.3", "-1.0");
     (void)snprintf(hour, sizeof hour, "%u", right);
     say("tilt.low.3", hour);
-    say("tilt.way.4", "2.0");
+    TEST_ASSERT_TRUE(fabs(next().way_mm - 1) < 1e-9);
+    say("tilt.way.4", "1.0");
     TEST_ASSERT_EQUAL_STRING("tilt.verdict", next().key);
 }
 

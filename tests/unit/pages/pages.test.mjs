@@ -7,7 +7,7 @@ const { wordsOf } = await import("/drives.js");
 const { Hand, isHolding } = await import("/hand.js").catch(() => ({}));
 const { atLimits, nearness } = await import("/limits.js");
 const { ACTORS, ROWS, WORDS } = await import("/states.js");
-const { TEXT } = await import("/text.js");
+const { TEXT, noticesIn } = await import("/text.js");
 const { span } = await import("/times.js");
 
 const css = readFileSync(new URL("../../../panel/style.css", import.meta.url), "utf8");
@@ -91,3 +91,11 @@ test("a hand is holding from the answer until it lets go, whatever ends it", asy
 });
 
 test("times have units", () => assert.deepEqual([20, 1000, 1500].map(span), ["20 µs", "1 ms", "1.5 ms"]));
+
+test("what people have to know first is told, and nothing else", () => {
+  const well = { estop_active: false, power_failing: false, selftest: { due: false }, configuration: { barred: false, slow_rise: false } };
+  assert.deepEqual(noticesIn(well), []);
+  assert.deepEqual(noticesIn({ ...well, configuration: { barred: false, slow_rise: true } }), ["slowRise"]);
+  assert.deepEqual(noticesIn({ estop_active: true, power_failing: true, selftest: { due: true }, configuration: { barred: true, slow_rise: true } }), ["estop", "power", "due", "barred", "slowRise"]);
+  for (const name of ["estop", "power", "due", "barred", "slowRise"]) assert.ok(TEXT[name].length === 2 && TEXT[name].every((text) => text.length > 0), name);
+});
