@@ -109,6 +109,10 @@ void linux_modbus_link_run(linux_modbus_link_t *self, const modbus_request_t *re
  *  @return a file descriptor, -1: not linked */
 int linux_modbus_link_fd(const linux_modbus_link_t *self);
 
+/** What is wrong and what helps.
+ *  @return English; "" where nothing is */
+const char *linux_modbus_trouble_text(linux_modbus_trouble_t trouble);
+
 /** us since the same instant as hal_clock_now_us(). */
 uint64_t linux_modbus_now_us(void);
 

@@ -10,11 +10,11 @@
 #include "platform/coils.h"
 #include "platform/modbus_section.h"
 #include "daemon/gpio_setup.h"
+#include "inspect/modbus_line.h"
 
 #define LEAVE_NS      5000000          /* seven frames, even at 125 kbit/s */
 #define LEAVE_POLL_NS 1000000          /* between looks whether drives have taken what stops them */
 #define LEAVE_POLLS   6000u            /* more than a quick stop takes */
-#define BROADCAST_US  20000u           /* after a broadcast, for drives to act */
 #define COIL_LOOK_US  1000000u         /* a board of relays is looked at so often */
 #define RUN_DIR       "/run/heave-can" /* where heave-can-flush@.path looks */
 
@@ -121,34 +121,11 @@ static hv_status_t open_cia402(devices_t *self, const config_t *config, gateway_
     return status == HV_OK ? cia402_init(&self->cia402, &self->cia402_config, can_hal(self)) : status;
 }
 
-/* The serial line of a section. */
-static void add_serial(linux_modbus_config_t *modbus, const config_modbus_rtu_t *serial)
-{
-    static const char k_parities[] = {'N', 'E', 'O'};
-    modbus->device = serial->device;
-    modbus->baud_bps = serial->baud_bps;
-    modbus->parity = k_parities[serial->parity];
-    modbus->stop_bits = serial->stop_bits;
-    modbus->direction = (linux_modbus_direction_t)serial->rs485;
-    modbus->direction_delay_us = serial->rs485_delay_us;
-}
-
-static void add_host(linux_modbus_config_t *modbus, const config_host_t *host)
-{
-    modbus->host = host->address;
-    modbus->port = host->port;
-}
-
 /* The board has a line of its own, so that it waits for no drive and no drive for it. */
 static hv_status_t open_coils(devices_t *self, const config_t *config, gateway_io_t *io)
 {
     const config_relays_modbus_t *board = &config->relays_modbus;
-    linux_modbus_config_t modbus = {.timeout_us = board->timeout_ms * 1000u};
-    if (board->hosts.count != 0) {
-        add_host(&modbus, &board->hosts.host[0]);
-    } else {
-        add_serial(&modbus, &board->serial);
-    }
+    const linux_modbus_config_t modbus = modbus_line_of_relays(board);
     const hv_status_t status = linux_modbus_open(&self->coil_line, &modbus);
     if (status != HV_OK) {
         return status == HV_ERR_ARG ? HV_ERR_RANGE : HV_ERR_IO;
@@ -199,24 +176,13 @@ static hv_status_t open_inputs(devices_t *self, const config_t *config, gateway_
 }
 
 /* A line of Modbus drives: the host of one drive, or of all; or the serial port. */
-static linux_modbus_config_t modbus_line_of(const config_t *config, unsigned line)
-{
-    linux_modbus_config_t modbus = {.timeout_us = config->modbus.timeout_ms * 1000u, .broadcast_pause_us = BROADCAST_US};
-    if (config->drives == CONFIG_DRIVES_MODBUS_TCP) {
-        add_host(&modbus, &config->modbus_tcp.hosts.host[line]);
-    } else {
-        add_serial(&modbus, &config->modbus_rtu);
-    }
-    return modbus;
-}
-
 /* A line that cannot be opened stays last, so that it can say why. */
 static hv_status_t open_modbus(devices_t *self, const config_t *config, gateway_io_t *io)
 {
     hal_modbus_t line[DRIVES_MAX] = {{NULL, NULL}};
     config_modbus_map(config, &self->modbus_map);
     for (unsigned i = 0; i < config_modbus_lines(config); i++) {
-        const linux_modbus_config_t modbus = modbus_line_of(config, i);
+        const linux_modbus_config_t modbus = modbus_line_of_drives(config, i);
         const hv_status_t status = linux_modbus_open(&self->modbus_line[i], &modbus);
         self->modbus_lines++;
         if (status != HV_OK) {

@@ -21,11 +21,13 @@
 #include "platform/cia402_section.h"
 #include "platform/modbus_section.h"
 #include "inspect/doctor_judge.h"
+#include "inspect/doctor_modbus.h"
 #include "inspect/doctor_probe.h"
 #include "linux_udp.h"
 
 #define LISTEN_MS 500u
 #define RAW_MS    500u
+#define CALL_MS   1000u /* some drives take 700 ms for 1000h */
 
 /* --- The machine --- */
 
@@ -104,14 +106,15 @@ static bool check_interface(doctor_report_t *report, const config_can_t *can, co
     return false;
 }
 
-static void check_strangers(doctor_report_t *report, const doctor_probe_t *probe, const cia402_config_t *drives)
+static void check_strangers(doctor_report_t *report, doctor_probe_t *probe, const cia402_config_t *drives)
 {
+    doctor_probe_call(probe, CALL_MS);
     for (unsigned node = 1; node < DOCTOR_NODES; node++) {
         bool is_ours = false;
         for (unsigned k = 0; k < drives->axes; k++) {
             is_ours |= drives->axis[k].node == node;
         }
-        if (!is_ours && probe->nmt[node] >= 0) {
+        if (!is_ours && doctor_probe_is_there(probe, node)) {
             doctor_say(report, DOCTOR_WARN, "node %u is on the bus and not in [cia402] nodes -> add it, or leave it", node);
         }
     }
@@ -220,8 +223,7 @@ bool doctor_run(const config_t *config, const char *file, FILE *out)
     if (config->drives == CONFIG_DRIVES_SIM) {
         doctor_say(&report, DOCTOR_OK, "drives are simulated: there is no bus to look at");
     } else if (config_modbus_is_used(config)) {
-        doctor_say(&report, DOCTOR_WARN,
-                   "drives on Modbus are not asked here -> start heaved; heavectl status shows each of them");
+        doctor_modbus_check(&report, config);
     } else {
         check_bus(&report, config, &host);
     }

@@ -9,14 +9,15 @@
 #include "heave/sdo.h"
 #include "linux_clock.h"
 
-#define TRIES     2u
-#define PAUSE_NS  200000
-#define EXTRA_US  5000u /* after an answer: who else answers? */
-#define SYNC_ID   0x80u
-#define OBJECTS   0x6000u /* of the first axis of a node; */
-#define CHANNEL   0x800u  /* those of the next one are so much further */
-#define SDO_ID    0x580u
-#define HEARTBEAT 0x700u
+#define TRIES         2u
+#define PAUSE_NS      200000
+#define CALL_PAUSE_MS 2u    /* two frames of 125 kbit/s */
+#define EXTRA_US      5000u /* after an answer: who else answers? */
+#define SYNC_ID       0x80u
+#define OBJECTS       0x6000u /* of the first axis of a node; */
+#define CHANNEL       0x800u  /* those of the next one are so much further */
+#define SDO_ID        0x580u
+#define HEARTBEAT     0x700u
 
 static uint64_t now_us(void)
 {
@@ -36,6 +37,7 @@ bool doctor_probe_open(doctor_probe_t *self, const char *interface)
     self->wire = (doctor_wire_t){.is_heard = false};
     for (unsigned i = 0; i < DOCTOR_NODES; i++) {
         self->nmt[i] = -1;
+        self->has_answered[i] = false;
     }
     self->is_local = linux_can_local_is(interface);
     const hv_status_t status =
@@ -80,6 +82,9 @@ static bool hear(doctor_probe_t *self, can_frame_t *frame)
         if (!frame->is_extended && frame->id > HEARTBEAT && frame->id < HEARTBEAT + DOCTOR_NODES && frame->length == 1) {
             self->nmt[frame->id - HEARTBEAT] = frame->data[0] & 0x7F;
         }
+        if (!frame->is_extended && frame->id > SDO_ID && frame->id < SDO_ID + DOCTOR_NODES) {
+            self->has_answered[frame->id - SDO_ID] = true;
+        }
         self->is_synced |= !frame->is_extended && frame->id == SYNC_ID;
         return true;
     }
@@ -108,6 +113,27 @@ void doctor_probe_listen(doctor_probe_t *self, unsigned ms)
 }
 
 /* --- CANopen --- */
+
+bool doctor_probe_is_there(const doctor_probe_t *self, unsigned node)
+{
+    return self->nmt[node] >= 0 || self->has_answered[node];
+}
+
+void doctor_probe_call(doctor_probe_t *self, unsigned ms)
+{
+    const doctor_address_t type = doctor_address[DOCTOR_TYPE];
+    for (unsigned node = 1; node < DOCTOR_NODES; node++) {
+        sdo_t sdo;
+        can_frame_t frame;
+        sdo_init(&sdo, (uint8_t)node, ms * 1000u);
+        sdo_read(&sdo, type.index, type.sub, 1);
+        if (sdo_step(&sdo, now_us(), &frame)) {
+            (void)!hal_can_send(self->bus, &frame);
+        }
+        doctor_probe_listen(self, CALL_PAUSE_MS);
+    }
+    doctor_probe_listen(self, ms);
+}
 
 /* Frames of a node: the client takes what it waits for, the others are too many. */
 static unsigned receive_answers(doctor_probe_t *self, sdo_t *sdo)

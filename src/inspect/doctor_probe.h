@@ -17,9 +17,10 @@ typedef struct {
     linux_can_t can;         /**< an interface */
     linux_can_local_t local; /**< a bus between programs */
     bool is_local;
-    int nmt[DOCTOR_NODES]; /**< in heartbeats, -1 = none heard */
-    bool is_synced;        /**< somebody sends SYNC */
-    doctor_wire_t wire;    /**< by doctor_probe_wire() */
+    int nmt[DOCTOR_NODES];           /**< in heartbeats, -1 = none heard */
+    bool has_answered[DOCTOR_NODES]; /**< an SDO */
+    bool is_synced;                  /**< somebody sends SYNC */
+    doctor_wire_t wire;              /**< by doctor_probe_wire() */
 } doctor_probe_t;
 
 /** Opens the bus.
@@ -35,6 +36,12 @@ const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self);
 
 /** Reads the bus for so many ms and sends nothing. */
 void doctor_probe_listen(doctor_probe_t *self, unsigned ms);
+
+/** Asks all nodes at once what they are (1000h), and reads the bus for so many ms. */
+void doctor_probe_call(doctor_probe_t *self, unsigned ms);
+
+/** Whether a node has been heard. */
+bool doctor_probe_is_there(const doctor_probe_t *self, unsigned node);
 
 /** Reads a CiA 402 drive. */
 void doctor_probe_node(doctor_probe_t *self, const cia402_axis_config_t *axis, unsigned timeout_ms, doctor_node_t *out);

@@ -14,8 +14,8 @@
 #include "linux_modbus_link.h"
 
 #define LISTEN_MS     300u
-#define NODE_MS       20u  /* twice; a drive on the bus answers within a few */
-#define KNOWN_MS      200u /* for one whose heartbeat was heard */
+#define CALL_MS       1000u /* some drives take 700 ms for 1000h */
+#define NODE_MS       1000u
 #define UNIT_US       60000u
 #define UNITS         247u
 #define USUAL_BAUD    115200u
@@ -46,19 +46,23 @@ static bool ask_nodes(doctor_probe_t *probe, FILE *out)
     char shown[SENTENCE_MAX];
     bool is_well = true;
     doctor_probe_listen(probe, LISTEN_MS);
+    doctor_probe_call(probe, CALL_MS);
+    const doctor_wire_t *wire = doctor_probe_wire(probe);
+    if (!wire->is_heard && wire->is_unacknowledged) {
+        fprintf(out, "%s %s\n", _("FAIL"),
+                _("nobody acknowledges on this bus: supply of the drives, cable, terminating resistors, bit rate"));
+        return false;
+    }
     for (unsigned id = 1; id < DOCTOR_NODES && is_well; id++) {
-        doctor_probe_node(probe, &(cia402_axis_config_t){.node = (uint8_t)id}, probe->nmt[id] >= 0 ? KNOWN_MS : NODE_MS, &node);
+        if (!doctor_probe_is_there(probe, id)) {
+            continue;
+        }
+        doctor_probe_node(probe, &(cia402_axis_config_t){.node = (uint8_t)id}, NODE_MS, &node);
         if (node.answer[DOCTOR_TYPE] != DOCTOR_NO_ANSWER) {
             show_node(&node, id, out);
             is_well = node.extra_answers == 0;
-        } else if (probe->nmt[id] >= 0) {
+        } else {
             fprintf(out, _("other node %u: has a heartbeat, and answers no SDO\n"), id);
-        }
-        const doctor_wire_t *wire = doctor_probe_wire(probe);
-        if (!wire->is_heard && wire->is_unacknowledged) {
-            fprintf(out, "%s %s\n", _("FAIL"),
-                    _("nobody acknowledges on this bus: supply of the drives, cable, terminating resistors, bit rate"));
-            return false;
         }
         if (doctor_probe_trouble(probe) != NULL) {
             fprintf(out, "%s %s\n", _("FAIL"), sentence(doctor_probe_trouble(probe), shown, sizeof shown));
@@ -88,37 +92,16 @@ static bool scan_can(const char *interface, FILE *out)
 
 /* --- Modbus --- */
 
-static const char *trouble_text(linux_modbus_trouble_t trouble)
-{
-    switch (trouble) {
-    case LINUX_MODBUS_NO_DEVICE:
-        return _("there is no such serial port");
-    case LINUX_MODBUS_NOT_SERIAL:
-        return _("this is no serial port");
-    case LINUX_MODBUS_NOT_ALLOWED:
-        return _("you may not open it; members of the group dialout may");
-    case LINUX_MODBUS_IN_USE:
-        return _("another program has it");
-    case LINUX_MODBUS_FINE:
-    case LINUX_MODBUS_NOT_TRIED:
-    case LINUX_MODBUS_NO_RS485:
-    case LINUX_MODBUS_REFUSED:
-    case LINUX_MODBUS_UNREACHABLE:
-    case LINUX_MODBUS_LOST:
-    case LINUX_MODBUS_SYSTEM_ERROR:
-        break;
-    }
-    return _("it cannot be used");
-}
-
 static bool ask_units(linux_modbus_link_t *link, const char *device, FILE *out)
 {
     static modbus_result_t result;
+    char shown[SENTENCE_MAX];
     linux_modbus_link_mend(link);
     for (unsigned unit = 1; unit <= UNITS; unit++) {
         const modbus_request_t request = {.function = MODBUS_READ_HOLDING, .unit = (uint8_t)unit, .count = 1};
         if (linux_modbus_link_fd(link) < 0) {
-            fprintf(out, "%s %s: %s\n", _("FAIL"), device, trouble_text(link->trouble));
+            fprintf(out, "%s %s: %s\n", _("FAIL"), device,
+                    sentence(linux_modbus_trouble_text(link->trouble), shown, sizeof shown));
             return false;
         }
         linux_modbus_link_run(link, &request, &result);

@@ -184,24 +184,44 @@ static void try_numberings(const layout_t *seen, const fit_t *seen_fit, guess_t 
     }
 }
 
-/* How far joints are from standing on one circle, in mm. */
-static double off_circle(const layout_t *layout, const joints_t *joints)
+static double between(const layout_t *layout, unsigned i, unsigned k) /* joints: of the base, then of the plate */
 {
-    double least = INFINITY;
-    double most = 0;
-    for (unsigned i = 0; i < layout->count; i++) {
-        const double radius = hypot(joints->at[i][0], joints->at[i][1]);
-        least = fmin(least, radius);
-        most = fmax(most, radius);
-    }
-    return most - least;
+    const double *a = i < layout->count ? layout->base.at[i] : layout->plate.at[i - layout->count];
+    const double *b = k < layout->count ? layout->base.at[k] : layout->plate.at[k - layout->count];
+    const double height = (i < layout->count ? 0 : layout->height) - (k < layout->count ? 0 : layout->height);
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2] + height) * (a[2] - b[2] + height));
 }
 
-/* Of numbers that explain the extensions, that one is likely which also puts both sets of joints in order, each on a circle. */
+/* Joint i where the platform looks the same: turned by a third, or seen in a mirror that exchanges cylinder 1 and that one. */
+static unsigned image_of(const layout_t *layout, unsigned i, unsigned mirror)
+{
+    const unsigned count = layout->count;
+    const unsigned cylinder = mirror < count ? (count + mirror - i % count) % count : (i + count / 3u) % count;
+    return i < count ? cylinder : count + cylinder;
+}
+
+/* How far the distances of all joints are from those of the image that is most like them, in mm. */
+static double asymmetry(const layout_t *layout)
+{
+    double least = INFINITY;
+    for (unsigned mirror = 0; mirror <= layout->count; mirror++) {
+        double most = 0;
+        for (unsigned i = 0; i < 2u * layout->count; i++) {
+            for (unsigned k = 0; k < i; k++) {
+                most = fmax(most, fabs(between(layout, i, k) -
+                                       between(layout, image_of(layout, i, mirror), image_of(layout, k, mirror))));
+            }
+        }
+        least = fmin(least, most);
+    }
+    return least;
+}
+
+/* Of numbers that explain the extensions, that one is likely which also puts both sets of joints in order, and alike. */
 static double disorder(const layout_t *layout)
 {
     const unsigned sets = (order_of(layout, &layout->base) == 0 ? 1u : 0u) + (order_of(layout, &layout->plate) == 0 ? 1u : 0u);
-    return off_circle(layout, &layout->base) + off_circle(layout, &layout->plate) + 1000.0 * sets;
+    return asymmetry(layout) + 1000.0 * sets;
 }
 
 /* One number of one joint, read as another one. */
@@ -367,15 +387,20 @@ static bool find_crossing(const layout_t *layout, config_text_t *text)
 }
 
 /* +Y is to the right: what is numbered clockwise, seen from above, has increasing angles. Right-handed coordinates have not. */
-static bool find_mirror(const layout_t *layout, config_text_t *text)
+static bool find_numbering(const layout_t *layout, config_text_t *text)
 {
-    if (order_of(layout, &layout->base) != -1 || order_of(layout, &layout->plate) != -1) {
-        return false;
+    const int base = order_of(layout, &layout->base);
+    const int plate = order_of(layout, &layout->plate);
+    if (base == 0 && plate == 0) {
+        config_text_add(text,
+                        _("[geometry] the cylinders are not numbered one after the other round the platform: right if their "
+                          "drives are numbered so too"));
+    } else if (base == -1 && plate == -1) {
+        config_text_add(
+            text, _("[geometry] the joints are numbered against the clock, seen from above: right if the cylinders are; but "
+                    "where Y was measured to the left, turn the signs of all y"));
     }
-    config_text_add(
-        text, _("[geometry] the joints are numbered against the clock, seen from above: right if the cylinders are; but where Y "
-                "was measured to the left, turn the signs of all y"));
-    return true;
+    return text->length > 0;
 }
 
 static bool find_tilt(const settings_t *settings, config_text_t *text)
@@ -432,7 +457,7 @@ bool config_layout_next_oddity(const config_t *config, unsigned *at, config_text
             is_found = find_crossing(&layout, text);
             break;
         case 2:
-            is_found = find_mirror(&layout, text);
+            is_found = find_numbering(&layout, text);
             break;
         case 3:
             is_found = find_tilt(&config->settings, text);

@@ -15,6 +15,8 @@ from test_can import can_config
 from twin_bench import WithTwin
 
 RAW_PRESET = harness.TOP / "config/can-raw-hexapod.ini"
+SERIAL_PRESET = harness.TOP / "config/modbus/iai-robo-cylinder.ini"
+MODBUS_PRESET = harness.TOP / "config/modbus-tcp-hexapod.ini"
 
 
 class DoctorBench(WithTwin):
@@ -91,7 +93,7 @@ def writes_nothing(bench, config):
             heard.append(message)
     sent = [message for message in heard if 0x600 <= message.arbitration_id < 0x680]
     assert len(sent) > 100 and all(message.data[0] in (0x40, 0x60, 0x70) for message in sent), "something else than reading"
-    own = {message.arbitration_id for message in heard} - {base + node for base in (0x600, 0x580, 0x700, 0x180, 0x280, 0x80) for node in range(1, 8)}
+    own = {message.arbitration_id for message in heard} - {base + node for base in (0x580, 0x700, 0x180, 0x280, 0x80) for node in range(1, 8)} - set(range(0x601, 0x680))
     assert not own, own
 
 
@@ -198,6 +200,19 @@ def unknown_node(bench, config):
         beat.stop()
 
 
+def unknown_node_without_heartbeat(bench, config):
+    """It speaks only where it is asked."""
+    bench.start_drives()
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        def answer(message):
+            if message.arbitration_id == 0x60C:
+                bus.send(can.Message(arbitration_id=0x58C, data=b"\x80" + message.data[1:4] + b"\x00\x00\x02\x06", is_extended_id=False))
+        listener = can.Notifier(bus, [answer])
+        rows = doctor(bench, config, 0, "node 12 is on the bus and not in [cia402] nodes")
+        listener.stop()
+        assert sum("is on the bus and not" in text for _, text in rows) == 1, rows
+
+
 def port_in_use(bench, config):
     bench.start_drives()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
@@ -221,6 +236,21 @@ def drives_with_frames_of_their_own(bench, _config):
     assert [text for level, text in rows if "answers with" in text] == [f"drive {k + 1} answers with identifier {0x581 + k:X}h" for k in range(5)], rows
 
 
+def drives_on_modbus(bench, _config):
+    hosts = ", ".join(f"127.0.0.1:{3501 + k}" for k in range(6))
+    text = re.sub("hosts = .*", f"hosts = {hosts}", MODBUS_PRESET.read_text(encoding="utf-8")).replace("port = 9800", f"port = {bench.port}")
+    bench.config = bench.file("modbus.ini", f"{text}\n[control]\nsocket = {bench.socket}\n")
+    doctor(bench, bench.config, 1, *(f"127.0.0.1:{3501 + k}: the connection is refused" for k in range(6)))
+    bench.start_drives("0 power-off 4", "0 exception 2 1000 2", "0 lose 5 1")
+    rows = doctor(bench, bench.config, 1, "drive 4: unit 1 does not answer", "drive 2: unit 1 refuses to read registers 256 to 259, exception 2")
+    assert [text for level, text in rows if "answers as" in text] == [f"drive {k} answers as unit 1" for k in (1, 3, 5, 6)], rows
+
+
+def serial_line_without_its_adapter(bench, _config):
+    text = SERIAL_PRESET.read_text(encoding="utf-8").replace("port = 9800", f"port = {bench.port}").replace("drive_timeout_confirmed = no", "drive_timeout_confirmed = yes")
+    doctor(bench, bench.file("serial.ini", f"{text}\n[control]\nsocket = {bench.socket}\n"), 1, "usb-your-adapter: there is no such serial device")
+
+
 CASES = [
     ("sound drives: nothing is wrong", sound),
     ("its inventory is ready to paste", inventory_is_ready_to_paste),
@@ -242,9 +272,12 @@ CASES = [
     ("two drives with one number", two_drives_with_one_number),
     ("another master on the bus", another_master),
     ("a node that nobody has configured", unknown_node),
+    ("a node that nobody has configured, without a heartbeat", unknown_node_without_heartbeat),
     ("a UDP port in use", port_in_use),
     ("a daemon that runs", running_daemon),
     ("drives with frames of their own, one of them missing", drives_with_frames_of_their_own),
+    ("drives on Modbus, before they run and with faults", drives_on_modbus),
+    ("a serial line without its adapter", serial_line_without_its_adapter),
 ]
 
 

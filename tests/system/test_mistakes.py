@@ -122,7 +122,8 @@ def random_pairs(count, seed):
     chance = random.Random(seed)
     while count > 0:
         pair = chance.sample(MISTAKES, 2)
-        if pair[0].kind != pair[1].kind:
+        kinds = {one.kind for one in pair}
+        if len(kinds) == 2 and kinds != {"lead", "scale"}:  # two wrong scales are one, or none
             yield pair
             count -= 1
 

@@ -43,7 +43,7 @@ LIMIT_S = 60
 
 # What cannot fail, or asks nobody, or only looks into memory.
 HARMLESS = set("""
-atan2 bcmp feof hypot memrchr sin cos strcasecmp strcasestr strncasecmp strcpy stpcpy strnlen __ctype_b_loc __ctype_toupper_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos mbrtowc memchr memcmp memcpy memmove memset strchr strcmp
+atan2 bcmp feof hypot memrchr sin cos strcasecmp strcasestr strncasecmp strcpy stpcpy strnlen __ctype_b_loc __ctype_toupper_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow remainder sqrt sincos mbrtowc memchr memcmp memcpy memmove memset strchr strcmp
 strcspn strerror strerrorname_np strlen strncat strncmp strncpy strpbrk strrchr strspn strstr strtod strtok strtok_r strtoll strtoul strtoull wcwidth snprintf vsnprintf gmtime_r localtime_r inet_ntop inet_pton qsort
 __libc_current_sigrtmax getenv putenv rewind dl_iterate_phdr getopt_long gai_strerror ferror fileno free raise syscall freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_cond_broadcast pthread_cond_init pthread_cond_timedwait pthread_condattr_destroy pthread_condattr_init pthread_condattr_setclock pthread_attr_setinheritsched
 pthread_attr_setschedparam pthread_attr_setschedpolicy pthread_attr_setstacksize pthread_equal pthread_mutex_init pthread_mutex_lock pthread_mutex_unlock

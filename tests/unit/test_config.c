@@ -1587,6 +1587,49 @@ static void test_check_report_of_every_platform_has_no_warning(void)
     }
 }
 
+static void expect_seen_from(const char *expected)
+{
+    static char text[TEXT_MAX];
+    (void)report(text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, expected), text);
+}
+
+/* A drawing of hexapod-400 has cylinders 1 and 2 at the front, 8 degrees to each side, and then clockwise by 60 degrees. */
+static void test_check_report_says_where_the_cylinders_are(void)
+{
+    load_platform("hexapod-400.ini");
+    expect_seen_from("front between 1 and 2, right at cylinder 3, rear between 4 and 5, left at cylinder 6\n");
+    for (unsigned i = 0; i < 6; i++) { /* a quarter turn: what was at the front is at the right */
+        q16_t *const joint[] = {m_config.settings.geometry.base_mm_q16[i], m_config.settings.geometry.plate_mm_q16[i]};
+        for (unsigned k = 0; k < 2; k++) {
+            const q16_t x_q16 = joint[k][0];
+            joint[k][0] = -joint[k][1];
+            joint[k][1] = x_q16;
+        }
+    }
+    expect_seen_from("front at cylinder 6, right between 1 and 2, rear at cylinder 3, left between 4 and 5\n");
+    load_platform("tripod.ini");
+    expect_seen_from("front at cylinder 1, right between 1 and 2, rear between 2 and 3, left between 1 and 3\n");
+}
+
+static void test_check_report_notes_what_is_easily_forgotten(void)
+{
+    static char text[TEXT_MAX];
+    static const char k_local[] = "note: [udp] bind: heaved hears senders on this machine only";
+    static const char k_estop[] = "note: [inputs] estop: heaved reads no e-stop";
+    load_platform("hexapod-cia402.ini");
+    TEST_ASSERT_EQUAL_INT(0, report(text, sizeof text));
+    TEST_ASSERT_NOT_NULL(strstr(text, k_local));
+    TEST_ASSERT_NOT_NULL(strstr(text, k_estop));
+    strcpy(m_config.inputs.estop_line.text, "17");
+    strcpy(m_config.udp.bind, "192.168.1.5");
+    (void)report(text, sizeof text);
+    TEST_ASSERT_NULL(strstr(text, "note:"));
+    load_platform("hexapod-400.ini"); /* nothing moves */
+    TEST_ASSERT_EQUAL_INT(0, report(text, sizeof text));
+    TEST_ASSERT_NULL(strstr(text, k_estop));
+}
+
 /* Where the report says that a cylinder ends an axis, the model has that cylinder at an end of its stroke. */
 static void expect_edge(unsigned axis, double value, unsigned cylinder)
 {
@@ -2043,6 +2086,8 @@ int main(void)
     RUN_TEST(test_load_limits_left_out_survive_a_dump_and_do_not_change_in_operation);
     RUN_TEST(test_load_limits_left_out_of_a_tripod_leave_other_axes_alone);
     RUN_TEST(test_check_report_of_every_platform_has_no_warning);
+    RUN_TEST(test_check_report_says_where_the_cylinders_are);
+    RUN_TEST(test_check_report_notes_what_is_easily_forgotten);
     RUN_TEST(test_check_report_reach_is_where_a_cylinder_ends);
     RUN_TEST(test_check_report_worst_cylinder_speed_is_not_below_that_at_neutral);
     RUN_TEST(test_check_report_warns_of_what_the_limits_do_not_allow);

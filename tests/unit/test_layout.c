@@ -229,6 +229,25 @@ static void test_the_digit_of_the_example_is_named_with_its_value(void)
     expect_refusal("y of plate3 looks as if its sign were wrong: with 408.766 ");
 }
 
+/* A joint that nothing else tells from its mirror image: the others, which stand round the middle, do. */
+static void test_every_wrong_sign_is_named(void)
+{
+    for (unsigned p = 0; p < HEXAPODS; p++) {
+        for (unsigned at = 0; at < 36u; at++) {
+            const unsigned i = at / 3u % 6u, k = at % 3u;
+            load_platform(k_hexapods[p]);
+            q16_t *value_q16 = &(at < 18u ? m_geometry->base_mm_q16 : m_geometry->plate_mm_q16)[i][k];
+            *value_q16 = -*value_q16;
+            if (*value_q16 == 0)
+                continue;
+            char expected[160];
+            snprintf(expected, sizeof expected, "%c of %s%u looks as if its sign were wrong", "xyz"[k],
+                     at < 18u ? "base" : "plate", i + 1);
+            expect_refusal(expected);
+        }
+    }
+}
+
 /* --- Nothing wrong --- */
 
 static void turn(q16_t joint[3], double angle, double scale, double noise_mm)
@@ -291,6 +310,19 @@ static void test_mirrored_frame_is_warned_of(void)
     }
 }
 
+/* Both joints of two cylinders exchanged: somebody may have numbered them so. */
+static void test_numbers_that_do_not_go_round_are_warned_of(void)
+{
+    for (unsigned p = 0; p < HEXAPODS; p++) {
+        load_platform(k_hexapods[p]);
+        TEST_ASSERT_FALSE(is_warned("not numbered one after the other"));
+        exchange(m_geometry->base_mm_q16[1], m_geometry->base_mm_q16[4]);
+        exchange(m_geometry->plate_mm_q16[1], m_geometry->plate_mm_q16[4]);
+        TEST_ASSERT_EQUAL_STRING("", refusal());
+        TEST_ASSERT_TRUE(is_warned("[geometry] the cylinders are not numbered one after the other round the platform"));
+    }
+}
+
 static void test_tilted_neutral_and_a_leg_that_sticks_out_are_warned_of(void)
 {
     load_platform("hexapod-400.ini");
@@ -312,10 +344,12 @@ int main(void)
     RUN_TEST(test_metres_are_named);
     RUN_TEST(test_two_digits_exchanged_are_refused);
     RUN_TEST(test_the_digit_of_the_example_is_named_with_its_value);
+    RUN_TEST(test_every_wrong_sign_is_named);
     RUN_TEST(test_platforms_measured_with_a_tape_are_not_refused);
     RUN_TEST(test_platform_without_symmetry_is_not_refused);
     RUN_TEST(test_as_measured_makes_a_warning_of_it);
     RUN_TEST(test_mirrored_frame_is_warned_of);
+    RUN_TEST(test_numbers_that_do_not_go_round_are_warned_of);
     RUN_TEST(test_tilted_neutral_and_a_leg_that_sticks_out_are_warned_of);
     return UNITY_END();
 }
