@@ -389,6 +389,16 @@ static void draw_fault(view_t *self, const cJSON *status)
     }
 }
 
+/* Which keys are others than those that were commissioned. */
+static void put_changed(view_t *self, const cJSON *changed)
+{
+    char shown[SENTENCE_MAX];
+    if (cJSON_IsString(changed) && changed->valuestring[0] != '\0') {
+        view_put_prose(self, ": ");
+        view_put_prose(self, sentence(changed->valuestring, shown, sizeof shown));
+    }
+}
+
 /* What the machine was never seen to do, and why the configuration that was applied last is not in force. */
 static void draw_configuration(view_t *self, const cJSON *status)
 {
@@ -397,6 +407,7 @@ static void draw_configuration(view_t *self, const cJSON *status)
         view_put_colour(self, YELLOW);
         view_put_label(self, _("config"));
         view_put_prose(self, _("not commissioned as it is now: rises at a tenth of engage speed; heavectl commissioned"));
+        put_changed(self, view_member(configuration, "changed"));
         view_put_colour(self, PLAIN);
         view_end_line(self);
     }

@@ -100,6 +100,7 @@ typedef struct control {
     blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< as last listed */
     int samples_fd;                                 /**< given to who asks for samples; -1: there are none. The owner sets it */
     status_lost_t lost;                             /**< the owner keeps it up to date */
+    config_text_t changed;                          /**< since the machine was commissioned */
     config_store_t *store;                          /**< the owner's; NULL: none */
     config_changes_t changes;                       /**< of what is being applied */
     uint32_t end_id;                                /**< of the last such request */

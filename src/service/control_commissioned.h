@@ -9,7 +9,7 @@
 #include "service/control.h"
 #include "service/lifetime.h"
 
-#define CONTROL_COMMISSIONED_SAID_MAX 200u
+#define CONTROL_COMMISSIONED_SAID_MAX 800u
 
 /** Answers `commissioned`: refused where nothing waits for it, and before the platform has risen since the start of heaved. */
 void control_commissioned_accept(control_t *self, control_client_t *client);

@@ -4,18 +4,16 @@
 #include "service/lifetime.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "common/clock_trust.h"
 #include "common/message.h"
 #include "common/sha256.h"
+#include "common/state_file.h"
 #include "common/state_path.h"
 
 #define COPIES      2u
@@ -142,9 +140,9 @@ static bool parse(const char *text, size_t length, lifetime_totals_t *totals)
 
 /* --- The files --- */
 
-static void name_of(const lifetime_t *self, unsigned copy, const char *suffix, char path[PATH_BYTES])
+static void name_of(const lifetime_t *self, unsigned copy, char path[PATH_BYTES])
 {
-    (void)snprintf(path, PATH_BYTES, "%s%s%s", self->path, copy == 0 ? "" : ".2", suffix);
+    (void)snprintf(path, PATH_BYTES, "%s%s", self->path, copy == 0 ? "" : ".2");
 }
 
 /* Returns 0, ENOENT, or what is wrong; EBADMSG: its text is not right. */
@@ -152,68 +150,17 @@ static int read_copy(const lifetime_t *self, unsigned copy, lifetime_totals_t *t
 {
     char path[PATH_BYTES];
     char text[TEXT_MAX];
-    name_of(self, copy, "", path);
-    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    if (fd < 0) {
-        return errno;
-    }
-    const ssize_t length = read(fd, text, sizeof text - 1);
-    const int error = errno;
-    (void)close(fd);
-    if (length < 0) {
-        return error;
-    }
-    text[length] = '\0';
-    return parse(text, (size_t)length, totals) ? 0 : EBADMSG;
+    size_t length = 0;
+    name_of(self, copy, path);
+    const int error = state_file_read(path, text, sizeof text, &length);
+    return error != 0 ? error : parse(text, length, totals) ? 0 : EBADMSG;
 }
 
-static int write_whole(int fd, const char *text, size_t length)
-{
-    const ssize_t written = write(fd, text, length);
-    if (written != (ssize_t)length) {
-        return written < 0 ? errno : ENOSPC;
-    }
-    return fsync(fd) == 0 ? 0 : errno;
-}
-
-/* The name has to be on the disk as well. */
-static void sync_folder(const char *path)
-{
-    char folder[PATH_BYTES];
-    (void)snprintf(folder, sizeof folder, "%s", path);
-    char *const slash = strrchr(folder, '/');
-    if (slash != NULL) {
-        slash[slash == folder ? 1 : 0] = '\0';
-        const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-        if (fd >= 0) {
-            (void)fsync(fd);
-            (void)close(fd);
-        }
-    }
-}
-
-/* Beside its place, then renamed: the old one is there until the new one is whole. */
 static int write_copy(const lifetime_t *self, const lifetime_totals_t *totals)
 {
-    char path[PATH_BYTES], part[PATH_BYTES], text[TEXT_MAX];
-    const unsigned copy = (unsigned)(totals->sequence % COPIES);
-    name_of(self, copy, "", path);
-    name_of(self, copy, ".new", part);
-    const int fd = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0640);
-    if (fd < 0) {
-        return errno;
-    }
-    int error = write_whole(fd, text, format(totals, text));
-    (void)close(fd);
-    if (error == 0 && rename(part, path) != 0) {
-        error = errno;
-    }
-    if (error != 0) {
-        (void)unlink(part);
-        return error;
-    }
-    sync_folder(path);
-    return 0;
+    char path[PATH_BYTES], text[TEXT_MAX];
+    name_of(self, (unsigned)(totals->sequence % COPIES), path);
+    return state_file_write(path, text, format(totals, text));
 }
 
 void lifetime_step(lifetime_t *self)
@@ -224,7 +171,8 @@ void lifetime_step(lifetime_t *self)
         is_new = true; /* the newest one has all that the others have */
     }
     if (is_new) {
-        __atomic_store_n(&self->error, write_copy(self, &totals), __ATOMIC_RELEASE);
+        const int error = write_copy(self, &totals);
+        __atomic_store_n(&self->error, error != 0 ? error : machine_keys_write(&self->keys), __ATOMIC_RELEASE);
     }
 }
 
@@ -271,13 +219,17 @@ void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftes
     }
 }
 
-void lifetime_note_commissioned(lifetime_t *self, uint32_t day, const char *machine_hash)
+bool lifetime_note_commissioned(lifetime_t *self, uint32_t day, const config_t *config)
 {
+    if (!machine_keys_note(&self->keys, config)) {
+        return false;
+    }
     self->now.commissioned.day = day;
-    (void)snprintf(self->now.commissioned.hash, sizeof self->now.commissioned.hash, "%s", machine_hash);
+    (void)snprintf(self->now.commissioned.hash, sizeof self->now.commissioned.hash, "%s", config->machine_hash);
     if (self->path[0] != '\0') {
         hand_over(self);
     }
+    return true;
 }
 
 uint32_t lifetime_today(void)
@@ -347,6 +299,7 @@ int lifetime_open(lifetime_t *self, const config_t *config, uint32_t axes)
     if (self->path[0] == '\0') {
         return EXIT_DONE;
     }
+    machine_keys_read(&self->keys, self->path, self->now.commissioned.hash);
     self->now.sequence++;
     const int unwritten = write_copy(self, &self->now);
     return unwritten == 0

@@ -11,6 +11,7 @@
 #include "common/worker.h"
 #include "config/config.h"
 #include "heave/telemetry.h"
+#include "service/machine_keys.h"
 
 #define LIFETIME_NAME       "life"    /* in the state directory, where no file is configured */
 #define LIFETIME_PERIOD_US  60000000u /* between two writes: so much is lost at most when the power goes */
@@ -55,6 +56,7 @@ typedef struct {
     lifetime_totals_t now;
     state_t state; /**< of the last look */
     uint64_t next_us;
+    machine_keys_t keys;       /**< of the machine that was commissioned */
     ring_t ring;               /**< lifetime_totals_t to the writer */
     int32_t error;             /**< atomic: errno of the newest write, 0 = it worked */
     int32_t logged_error;      /**< error that lifetime_trouble() has told of */
@@ -81,8 +83,9 @@ void lifetime_serve(lifetime_t *self, const snapshot_t *snapshot, uint64_t now_u
 /** Keeps what has come of a self-test, on the disk as soon as it takes it; `boot` is filled in. */
 void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftest);
 
-/** Keeps that the machine was commissioned, likewise. */
-void lifetime_note_commissioned(lifetime_t *self, uint32_t day, const char *machine_hash);
+/** Keeps that the machine was commissioned, likewise, with the keys that describe it.
+ *  @return false: those before are being written; try again */
+bool lifetime_note_commissioned(lifetime_t *self, uint32_t day, const config_t *config);
 
 /** The day of the local calendar, as 20261123. */
 uint32_t lifetime_today(void);

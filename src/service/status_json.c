@@ -445,6 +445,7 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     } else {
         json_null(json, "commissioned_day");
     }
+    json_text(json, "changed", lost->changed != NULL ? lost->changed : "");
     json_text(json, "put_back", lost->put_back != NULL ? lost->put_back : "");
     json_close(json, '}');
 }

@@ -18,6 +18,7 @@ typedef struct {
     uint64_t unix_ms;              /**< the time of day, for who compares the status with something else */
     const lifetime_totals_t *life; /**< of the machine; NULL: not known yet */
     const char *digest;            /**< of the configuration's text; NULL: not known */
+    const char *changed;           /**< since the machine was commissioned; NULL or "": not known, or nothing */
     const char *put_back;          /**< why what was applied is not in force; NULL or "": nothing was put back */
     bool is_untested;              /**< nobody engages until a self-test has passed */
     bool is_unapproved;            /**< nothing moves until somebody has acknowledged the configuration */

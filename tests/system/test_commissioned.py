@@ -4,6 +4,7 @@
 is built has changed."""
 import contextlib
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -163,6 +164,10 @@ def never_commissioned():
             told = configuration(daemon)
             assert told["slow_rise"] is True and told["commissioned_day"] > 20260000, told
             assert "the machine's keys have changed since it was commissioned (20" in daemon.log, daemon.log
+            assert told["changed"] == "[cia402] counts_per_mm was 65536/5 and is 32768/5", told
+            assert f"`heavectl commissioned`: {told['changed']}" in daemon.log, daemon.log
+            assert told["changed"] in re.sub(r"\s+", " ", ask(daemon, "status").stdout)
+            assert "由 65536/5 变为 32768/5" in re.sub(r"\s+", " ", ask(daemon, "status", environment=test_chinese.CHINESE).stdout)
 
 
 def nothing_to_ask():

@@ -887,7 +887,7 @@ def moves_what_was_approved(bench):
     told = dict(status["configuration"])
     assert re.fullmatch("[0-9a-f]{16}", told.pop("machine")), told
     assert re.fullmatch("[0-9a-f]{16}", told.pop("digest")), told
-    assert told == {"hash": identity, "approved": "0123456789abcdef", "barred": True, "slow_rise": False, "commissioned_day": None, "put_back": ""}, told
+    assert told == {"hash": identity, "approved": "0123456789abcdef", "barred": True, "slow_rise": False, "commissioned_day": None, "changed": "", "put_back": ""}, told
     assert bench.ask("acknowledge") == ({"ok": True, "state": "OFF"}, 0)
     answer, code = bench.ask("acknowledge")
     assert code == 1 and "there is nothing to acknowledge" in answer["error"], answer

@@ -63,7 +63,7 @@ ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next
              ("standard_descriptors.c", "open"): "only where a standard descriptor is closed; test_beside.py closes them",
              ("operator_log.c", "rename"): "when the file is full: the old one goes on, see tests/unit/test_operator_log.c",
              ("operator_log.c", "ftruncate"): "when half a line went in: see there",
-             ("lifetime.c", "unlink"): "tidies up after another failure, which is what is told",
+             ("state_file.c", "unlink"): "tidies up after another failure, which is what is told",
              ("output_file.c", "poll"): "when a pipe is full at the end",
              **{("hold.c", function): "only while a person holds a key; test_service_mode.py stops, kills and cuts it off" for function in ("fflush", "send", "recv", "read", "poll")},
              **{(file, function): "only with a person at a terminal; test_selftest.py kills it there, and gives it a report that cannot be written"

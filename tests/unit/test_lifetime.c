@@ -136,7 +136,9 @@ static void test_commissioned_is_kept_with_its_machine(void)
     const lifetime_selftest_t selftest = {.day = 20261124, .is_passed = true, .hash = "0123456789abcdef"};
     TEST_ASSERT_EQUAL(EXIT_DONE, start());
     TEST_ASSERT_EQUAL_UINT32(0, m_life.now.commissioned.day);
-    lifetime_note_commissioned(&m_life, 20261123, "fedcba9876543210");
+    strcpy(m_config.machine_hash, "fedcba9876543210");
+    TEST_ASSERT_TRUE(lifetime_note_commissioned(&m_life, 20261123, &m_config));
+    TEST_ASSERT_FALSE(lifetime_note_commissioned(&m_life, 20261124, &m_config)); /* not written yet */
     for (unsigned i = 0; i < 2; i++) {
         TEST_ASSERT_TRUE(lifetime_close(&m_life));
         TEST_ASSERT_EQUAL(EXIT_DONE, start());
