@@ -4,18 +4,36 @@
 #include "common/presets.h"
 
 #include <dirent.h>
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "common/translate.h"
 
 #define ENDING    ".ini"
+#define FOLDER    "/share/heave/presets"
 #define NAME_ROOM 20 /* columns of a name */
+
+/* Where they are beside the program: in a build folder, or where an installation was moved to. Empty: they are not there. */
+static const char *beside_program(void)
+{
+    static char path[PATH_MAX + sizeof FOLDER];
+    const ssize_t length = readlink("/proc/self/exe", path, PATH_MAX);
+    path[length > 0 ? length : 0] = '\0';
+    for (unsigned i = 0; i < 2; i++) { /* from bin/heaved */
+        char *slash = strrchr(path, '/');
+        path[slash != NULL ? slash - path : 0] = '\0';
+    }
+    memcpy(&path[strlen(path)], FOLDER, sizeof FOLDER);
+    return access(path, R_OK) == 0 ? path : "";
+}
 
 const char *presets_directory(void)
 {
     const char *named = getenv("HEAVE_PRESETS");
-    return named != NULL && named[0] != '\0' ? named : HEAVE_PRESET_DIRECTORY;
+    const char *beside = named == NULL || named[0] == '\0' ? beside_program() : named;
+    return beside[0] != '\0' ? beside : HEAVE_PRESET_DIRECTORY;
 }
 
 bool presets_path(const char *name, char *path, size_t size)

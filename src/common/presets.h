@@ -7,7 +7,8 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/** The folder. The environment variable HEAVE_PRESETS replaces it. */
+/** The folder: HEAVE_PRESETS of the environment, else share/heave/presets beside the folder of the program, else where it is
+ * installed. One thread at a time. */
 const char *presets_directory(void);
 
 /** Makes the path of a preset's file.

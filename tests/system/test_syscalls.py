@@ -86,7 +86,7 @@ ERRNOS = {
     "adjtimex": ["EPERM"], "accept4": ["EMFILE", "ECONNABORTED", "EINTR", "EAGAIN"], "access": ["EACCES", "EROFS"], "bind": ["EADDRINUSE", "EACCES", "EADDRNOTAVAIL", "ENODEV"],
     "calloc": MEMORY, "malloc": MEMORY, "realloc": MEMORY, "chmod": ["EPERM", "EROFS"], "clock_nanosleep": ["EINTR", "EINVAL"],
     "fork": ["EAGAIN", "ENOMEM"], "prctl": ["EINVAL"], "waitpid": ["EINTR"], "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "dup3": ["EBUSY", "EMFILE"], "execv": ["ENOENT", "ENOMEM"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fcntl": ["EBADF"], "fclose": DISK, "fdatasync": DISK, "ftruncate": DISK, "getgrnam": ["ENOENT", "EIO", "EMFILE"], "fflush": DISK,
-    "fdopen": MEMORY, "fgets": ["EIO"], "fmemopen": MEMORY, "fopen": FILES, "memfd_create": ["EMFILE", "ENOMEM"], "mmap": MEMORY, "scandir": ["ENOENT", "ENOMEM"], "sendmsg": ["EPIPE", "EAGAIN", "EINTR"], "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrlimit": ["EFAULT"], "getrusage": ["EINVAL"], "setrlimit": ["EPERM"],
+    "fdopen": MEMORY, "fgets": ["EIO"], "fmemopen": MEMORY, "fopen": FILES, "memfd_create": ["EMFILE", "ENOMEM"], "mmap": MEMORY, "scandir": ["ENOENT", "ENOMEM"], "sendmsg": ["EPIPE", "EAGAIN", "EINTR"], "fread": ["EIO"], "readlink": ["ENOENT", "EACCES"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrlimit": ["EFAULT"], "getrusage": ["EINVAL"], "setrlimit": ["EPERM"],
     "getsockname": ["ENOBUFS"], "getsockopt": ["ENOBUFS"], "if_nametoindex": ["ENODEV", "EMFILE"], "ioctl": ["EIO", "ENODEV", "ENOTTY", "EBUSY", "EPERM"], "link": ["EACCES", "ENOSPC"], "listen": ["EADDRINUSE"],
     "lstat": ["EACCES", "ENOENT"], "mkdir": ["EACCES", "ENOSPC", "EROFS"], "mlockall": ["EPERM", "ENOMEM"], "open": [*FILES, "ENOSPC", "EROFS", "EINTR"],
     "open_memstream": MEMORY, "opendir": FILES, "poll": ["EINTR", "ENOMEM"], "ppoll": ["EINTR", "ENOMEM"], "pread": ["EIO"], "pwrite": ["ENOSPC", "ENOMEM"], "pthread_create": ["EAGAIN", "EPERM"],
@@ -169,7 +169,7 @@ class Page:
         self.fd = os.memfd_create("failures")
         os.ftruncate(self.fd, Page.SIZE)
         self.memory = mmap.mmap(self.fd, Page.SIZE)
-        self.options = {"pass_fds": (self.fd,), "env": {**os.environ, "LC_ALL": "C", "HEAVE_PRESETS": str(harness.TOP / "config"), "HEAVE_FAILURES": str(self.fd),
+        self.options = {"pass_fds": (self.fd,), "env": {**os.environ, "LC_ALL": "C", "HEAVE_FAILURES": str(self.fd),
                                                          "LD_PRELOAD": f"{folder}/libfailing_calls.so:{folder}/libmalloc_guard.so"}}
 
     def close(self):

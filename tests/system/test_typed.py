@@ -47,7 +47,7 @@ def has_gone(group, number):
 
 def typed(text, folder):
     """Its exit status and all it has printed. What it has started ends with it."""
-    environment = {**os.environ, "PATH": f"{BIN}:{Path(sys.executable).parent}:{os.environ['PATH']}", "LC_ALL": "C.UTF-8", "HEAVE_PRESETS": str(harness.TOP / "config")}
+    environment = {**os.environ, "PATH": f"{BIN}:{Path(sys.executable).parent}:{os.environ['PATH']}", "LC_ALL": "C.UTF-8"}
     with subprocess.Popen(["bash", "-e", "-o", "pipefail"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=folder, env=environment, start_new_session=True) as shell:
         said = folder / "said"
         shell.stdin.write(f"exec > {said} 2>&1\n{moved(text, folder)}\n")
