@@ -10,6 +10,7 @@
 #include "common/translate.h"
 #include "heavectl/view_drive.h"
 #include "heavectl/view_lines.h"
+#include "heavectl/view_trouble.h"
 
 #define BAR_COLUMNS_MIN    8u
 #define BAR_COLUMNS_MAX    60u
@@ -17,23 +18,18 @@
 #define LABEL_COLUMNS      9
 #define POSE_LABEL_COLUMNS 7u
 #define POSE_COLUMNS       11u
-#define BOLD               "\x1b[1m"
-#define RED                "\x1b[1;31m"
-#define GREEN              "\x1b[1;32m"
-#define YELLOW             "\x1b[1;33m"
-#define PLAIN              "\x1b[0m"
 
 /* --- Parts of the table --- */
 
 static const char *state_colour(const char *state)
 {
     if (strcmp(state, "FAULT") == 0 || strcmp(state, "ESTOP") == 0) {
-        return RED;
+        return VIEW_RED;
     }
     if (strcmp(state, "HOLD") == 0) {
-        return YELLOW;
+        return VIEW_YELLOW;
     }
-    return strcmp(state, "ENGAGED") == 0 ? GREEN : BOLD;
+    return strcmp(state, "ENGAGED") == 0 ? VIEW_GREEN : VIEW_BOLD;
 }
 
 static void draw_head(view_t *self, const cJSON *status)
@@ -41,7 +37,7 @@ static void draw_head(view_t *self, const cJSON *status)
     const double up_s = view_number(status, "uptime_ms") / 1000.0;
     view_put_colour(self, state_colour(view_word(status, "state")));
     view_put_padded(self, view_text(status, "state"), LABEL_COLUMNS);
-    view_put_colour(self, PLAIN);
+    view_put_colour(self, VIEW_PLAIN);
     const bool is_waiting = cJSON_IsTrue(view_member(status, "waiting_for_sender"));
     const bool is_silent = cJSON_IsTrue(view_member(status, "held_by_silence"));
     view_put(self, " goal ");
@@ -69,6 +65,9 @@ static void draw_pose(view_t *self, const cJSON *status, const char *label, cons
 {
     static const char *const k_axes[] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"};
     const cJSON *pose = view_member(status, name);
+    if (per[0] != '\0') { /* the others go with their head */
+        view_entry(self, VIEW_EXTRA);
+    }
     view_put_padded(self, translate(label), POSE_LABEL_COLUMNS);
     for (unsigned i = 0; i < sizeof k_axes / sizeof k_axes[0]; i++) {
         if (cJSON_IsObject(pose)) {
@@ -85,6 +84,7 @@ static void draw_pose(view_t *self, const cJSON *status, const char *label, cons
 static void draw_poses(view_t *self, const cJSON *status)
 {
     static const char *const k_heads[] = {N_("roll deg"), N_("pitch deg"), N_("yaw deg"), N_("x mm"), N_("y mm"), N_("z mm")};
+    view_entry(self, VIEW_ASKED);
     view_put_padded(self, _("pose"), POSE_LABEL_COLUMNS);
     for (unsigned i = 0; i < sizeof k_heads / sizeof k_heads[0]; i++) {
         view_put_right(self, translate(k_heads[i]), POSE_COLUMNS);
@@ -138,12 +138,14 @@ static void draw_actual(view_t *self, const cJSON *axis, const char *name)
 static void draw_cylinders(view_t *self, const cJSON *status)
 {
     const cJSON *cylinder = NULL;
+    view_entry(self, VIEW_NEEDED);
     view_put(self, "cylinder, sent (bar) and actual, mm");
     view_end_line(self);
     cJSON_ArrayForEach(cylinder, view_member(status, "cylinders"))
     {
         const double sent = view_number(cylinder, "sent_mm");
         const double actual = cJSON_IsNumber(view_member(cylinder, "actual_mm")) ? view_number(cylinder, "actual_mm") : sent;
+        view_entry(self, VIEW_NEEDED);
         view_put(self, " %.0f ", view_number(cylinder, "number"));
         draw_bar(self, sent, actual, view_number(cylinder, "stroke_mm"));
         view_put(self, " %9.3f", sent);
@@ -152,6 +154,7 @@ static void draw_cylinders(view_t *self, const cJSON *status)
     }
     const cJSON *rotation = view_member(status, "rotation");
     if (cJSON_IsObject(rotation)) {
+        view_entry(self, VIEW_NEEDED);
         view_put(self, "rotation motor %.3f deg, actual", view_number(rotation, "sent_deg"));
         draw_actual(self, rotation, "actual_deg");
         view_drive(self, rotation);
@@ -167,6 +170,7 @@ static void draw_bus(view_t *self, const cJSON *bus)
     if (!cJSON_IsObject(bus)) {
         return;
     }
+    view_entry(self, VIEW_NEEDED);
     view_put_label(self, _("bus"));
     view_put_piece(self, "%s", now[0] != '\0' ? sentence(now, shown, sizeof shown) : _("works"));
     if (now[0] == '\0' && before[0] != '\0') {
@@ -191,6 +195,7 @@ static void draw_relays(view_t *self, const cJSON *status)
 {
     const cJSON *relays = view_member(status, "relays");
     const unsigned count = (unsigned)view_number(relays, "count");
+    view_entry(self, VIEW_ASKED);
     view_put_label(self, _("relays"));
     for (unsigned i = 1; i <= count; i++) {
         view_put(self, "%u", i);
@@ -212,6 +217,7 @@ static void draw_counts(view_t *self, const char *label, const cJSON *counts)
 {
     const cJSON *item = NULL;
     bool is_any = false;
+    view_entry(self, VIEW_EXTRA);
     view_put_label(self, label);
     cJSON_ArrayForEach(item, counts)
     {
@@ -229,6 +235,7 @@ static void draw_intensity(view_t *self, const cJSON *intensity)
 {
     const double percent = view_number(intensity, "percent");
     const double now = view_number(intensity, "now_percent");
+    view_entry(self, VIEW_EXTRA);
     view_put(self, "intensity %.0f %% of the sender's motion", percent);
     if (now != percent) {
         view_put(self, ", now %.1f %%", now);
@@ -241,6 +248,7 @@ static void draw_senders(view_t *self, const cJSON *status)
 {
     const cJSON *sender = view_member(status, "sender");
     const cJSON *other = view_member(status, "other_sender");
+    view_entry(self, VIEW_NEEDED);
     view_put_label(self, _("sender"));
     view_put(self, "%s", cJSON_IsObject(sender) ? view_word(sender, "address") : _("none yet"));
     if (strcmp(view_word(sender, "mask"), "digits") == 0) {
@@ -274,6 +282,7 @@ static const char *sender_words(const char *sender)
 static void draw_stream(view_t *self, const cJSON *stream)
 {
     const char *words = sender_words(view_word(stream, "sender"));
+    view_entry(self, VIEW_ASKED);
     if (words[0] == '\0') {
         view_put_label(self, _("stream"));
         view_put(self, "%s", _("none"));
@@ -321,37 +330,11 @@ static const char *flag_words(const char *flag)
     return flag;
 }
 
-/* What heaved itself has found an axis to be off. */
-static void draw_distance(view_t *self, const cJSON *fault, const char *unit)
-{
-    char off[16], allowed[16];
-    (void)snprintf(off, sizeof off, "off_%s", unit);
-    (void)snprintf(allowed, sizeof allowed, "allowed_%s", unit);
-    if (!cJSON_IsNumber(view_member(fault, off))) {
-        return;
-    }
-    view_put(self, "  found  by heaved: %.2f %s off, allowed %.2f %s", view_number(fault, off), unit, view_number(fault, allowed),
-             unit);
-    view_end_line(self);
-}
-
-/* What the drive of a fault was at when it began. */
-static void draw_device(view_t *self, const cJSON *fault)
-{
-    const cJSON *report = view_member(fault, "report");
-    if (view_word(fault, "device_text")[0] != '\0') {
-        view_put_piece(self, " (%s)", view_text(fault, "device_text"));
-    }
-    if (view_number(report, "code") > 0.0) {
-        view_drive_object(self, report);
-        view_drive_detail(self, report);
-    }
-}
-
 static void draw_flags(view_t *self, const cJSON *status)
 {
     const cJSON *flag = NULL;
     bool is_any = false;
+    view_entry(self, VIEW_ASKED);
     view_put_label(self, _("flags"));
     cJSON_ArrayForEach(flag, view_member(status, "flags"))
     {
@@ -361,79 +344,16 @@ static void draw_flags(view_t *self, const cJSON *status)
     view_end_line(self);
 }
 
-static void draw_fault(view_t *self, const cJSON *status)
-{
-    const cJSON *fault = view_member(status, "fault");
-    const bool is_faulty = view_number(fault, "code") > 0.0;
-    view_put_colour(self, is_faulty ? RED : "");
-    view_put_label(self, _("fault"));
-    view_put_words(self, fault, "text");
-    if (view_number(fault, "axis") > 0.0) {
-        view_put(self, ", axis %.0f", view_number(fault, "axis"));
-    }
-    if (view_number(fault, "device_code") > 0.0) {
-        view_put(self, ", device code 0x%04X", (unsigned)view_number(fault, "device_code"));
-    }
-    draw_device(self, fault);
-    view_put_colour(self, is_faulty ? PLAIN : "");
-    view_end_line(self);
-    if (is_faulty) {
-        draw_distance(self, fault, "mm");
-        draw_distance(self, fault, "deg");
-        view_put_padded(self, _("  cause"), LABEL_COLUMNS);
-        view_put_words(self, fault, "cause");
-        view_end_line(self);
-        view_put_padded(self, _("  remedy"), LABEL_COLUMNS);
-        view_put_words(self, fault, "remedy");
-        view_end_line(self);
-    }
-}
-
-/* Which keys are others than those that were commissioned. */
-static void put_changed(view_t *self, const cJSON *changed)
-{
-    char shown[SENTENCE_MAX];
-    if (cJSON_IsString(changed) && changed->valuestring[0] != '\0') {
-        view_put_prose(self, ": ");
-        view_put_prose(self, sentence(changed->valuestring, shown, sizeof shown));
-    }
-}
-
-/* What the machine was never seen to do, and why the configuration that was applied last is not in force. */
-static void draw_configuration(view_t *self, const cJSON *status)
-{
-    const cJSON *configuration = view_member(status, "configuration"), *why = view_member(configuration, "put_back");
-    if (cJSON_IsTrue(view_member(configuration, "slow_rise"))) {
-        view_put_colour(self, YELLOW);
-        view_put_label(self, _("config"));
-        view_put_prose(self, _("not commissioned as it is now: rises at a tenth of engage speed; heavectl commissioned"));
-        put_changed(self, view_member(configuration, "changed"));
-        view_put_colour(self, PLAIN);
-        view_end_line(self);
-    }
-    char shown[SENTENCE_MAX];
-    if (!cJSON_IsString(why) || why->valuestring[0] == '\0') {
-        return;
-    }
-    view_put_colour(self, YELLOW);
-    view_put_label(self, _("config"));
-    view_put_prose(self, _("what was applied could not be started; the one before it is in force again: "));
-    view_put_prose(self, sentence(why->valuestring, shown, sizeof shown));
-    view_put_colour(self, PLAIN);
-    view_end_line(self);
-}
-
 size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char text[CTL_VIEW_BYTES])
 {
-    view_t view = {.style = style};
-    view.text = text;
-    text[0] = '\0';
+    view_t view;
+    view_start(&view, style);
     const bool is_faulty = view_number(view_member(status, "fault"), "code") > 0.0;
     draw_head(&view, status);
     if (is_faulty) { /* at once below the state: of a table that is too long, the end is not seen */
-        draw_fault(&view, status);
+        view_fault(&view, status);
     }
-    draw_configuration(&view, status);
+    view_configuration(&view, status);
     draw_poses(&view, status);
     draw_cylinders(&view, status);
     draw_bus(&view, view_member(status, "bus"));
@@ -443,9 +363,9 @@ size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char t
     draw_frames(&view, status);
     draw_flags(&view, status);
     if (!is_faulty) {
-        draw_fault(&view, status);
+        view_fault(&view, status);
     }
-    return view.length;
+    return view_end(&view, text);
 }
 
 static double total(const cJSON *counts)
@@ -465,8 +385,8 @@ size_t ctl_view_line(const cJSON *status, char text[CTL_VIEW_BYTES])
     const cJSON *pose = view_member(status, "pose_sent");
     const cJSON *counters = view_member(status, "counters");
     const cJSON *cylinder = NULL;
-    view_t view = {.style = &k_style};
-    view.text = text;
+    view_t view;
+    view_start(&view, &k_style);
     view_put(&view, "%s goal %s pose %.3f %.3f %.3f deg %.3f %.3f %.3f mm cylinders", view_text(status, "state"),
              view_text(status, "goal"), view_number(pose, "roll_deg"), view_number(pose, "pitch_deg"),
              view_number(pose, "yaw_deg"), view_number(pose, "x_mm"), view_number(pose, "y_mm"), view_number(pose, "z_mm"));
@@ -479,5 +399,5 @@ size_t ctl_view_line(const cJSON *status, char text[CTL_VIEW_BYTES])
              total(view_member(counters, "accepted")), total(view_member(counters, "rejected")),
              view_word(view_member(status, "fault"), "name"));
     view_end_line(&view);
-    return view.length;
+    return view_end(&view, text);
 }

@@ -124,9 +124,13 @@ void view_drive(view_t *self, const cJSON *axis)
     view_put(self, " %s",
              strcmp(drive, "enabled") == 0 && !cJSON_IsTrue(view_member(axis, "homed")) ? _("no zero") : translate(drive));
     view_end_line(self);
+    view_entry(self, VIEW_EXTRA);
     draw_service(self, axis);
+    view_entry(self, VIEW_HELPS);
     draw_report(self, view_member(axis, "report"), drive);
+    view_entry(self, VIEW_DETAIL);
     draw_notes(self, view_member(axis, "report"));
     draw_emergency(self, view_member(view_member(axis, "report"), "emergency"));
+    view_entry(self, VIEW_EXTRA);
     draw_telemetry(self, view_member(view_member(axis, "report"), "telemetry"));
 }

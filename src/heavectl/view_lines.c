@@ -104,19 +104,90 @@ void view_put_colour(view_t *self, const char *sequence)
 
 void view_end_line(view_t *self)
 {
-    const bool is_seen = self->style->rows == 0 || self->rows < self->style->rows;
-    const bool is_last = self->rows + 1u == self->style->rows; /* what ended it would scroll the first one away */
-    const char *line_end = is_last ? "" : self->style->line_end;
-    const size_t end = strlen(line_end);
-    self->rows++;
-    if (is_seen && self->length + self->at + end < CTL_VIEW_BYTES) {
-        memcpy(&self->text[self->length], self->line, self->at);
-        memcpy(&self->text[self->length + self->at], line_end, end + 1);
-        self->length += self->at + end;
+    if (self->rows < VIEW_LINES_MAX && self->length + self->at <= sizeof self->body) {
+        self->lines[self->rows++] =
+            (view_line_t){.start = self->length, .length = self->at, .entry = self->entry, .worth = self->worth};
+        memcpy(&self->body[self->length], self->line, self->at);
+        self->length += self->at;
     }
     self->at = 0;
     self->columns = 0;
 }
+
+/* --- The whole text --- */
+
+void view_start(view_t *self, const ctl_view_style_t *style)
+{
+    self->style = style;
+    self->length = 0;
+    self->rows = 0;
+    self->entry = 0;
+    self->worth = VIEW_NEEDED;
+    self->at = 0;
+    self->columns = 0;
+}
+
+void view_entry(view_t *self, view_worth_t worth)
+{
+    self->entry++;
+    self->worth = worth;
+}
+
+/* Leaves out the last one of the entries that are worth least. Returns false where only needed ones are left. */
+static bool leave_out(view_t *self)
+{
+    view_worth_t least = VIEW_NEEDED;
+    unsigned entry = 0;
+    unsigned kept = 0;
+    for (unsigned i = 0; i < self->rows; i++) {
+        if (self->lines[i].worth >= least) {
+            least = self->lines[i].worth;
+            entry = self->lines[i].entry;
+        }
+    }
+    for (unsigned i = 0; i < self->rows && least != VIEW_NEEDED; i++) {
+        if (self->lines[i].entry != entry) {
+            self->lines[kept++] = self->lines[i];
+        }
+    }
+    self->rows = least != VIEW_NEEDED ? kept : self->rows;
+    return least != VIEW_NEEDED;
+}
+
+static void fit(view_t *self)
+{
+    const unsigned all = self->rows;
+    const unsigned high = self->style->rows;
+    if (high == 0 || all <= high) {
+        return;
+    }
+    while (self->rows >= high && leave_out(self)) {}
+    self->rows = self->rows >= high ? high - 1u : self->rows;
+    view_put(self, "%u lines more in a higher window, or with heavectl status", all - self->rows);
+    view_end_line(self);
+}
+
+size_t view_end(view_t *self, char text[CTL_VIEW_BYTES])
+{
+    size_t length = 0;
+    fit(self);
+    for (unsigned i = 0; i < self->rows; i++) {
+        const view_line_t *line = &self->lines[i];
+        const bool is_last = i + 1u == self->style->rows; /* what ended it would scroll the first one away */
+        const char *line_end = is_last ? "" : self->style->line_end;
+        const size_t end = strlen(line_end);
+        if (length + line->length + end + 1u > CTL_VIEW_BYTES) {
+            break;
+        }
+        memcpy(&text[length], &self->body[line->start], line->length);
+        memcpy(&text[length + line->length], line_end, end);
+        length += line->length + end;
+    }
+    text[length] = '\0';
+    return length;
+}
+
+/* --- Lines that go on in the next one --- */
 
 /* Goes on in the next line, under what stands behind a label. */
 static void wrap(view_t *self)
