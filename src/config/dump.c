@@ -85,22 +85,27 @@ static void write_row(const config_key_t *key, FILE *out)
     config_value_allowed(key, &allowed);
     fprintf(out, "| `%s` | ", key->name);
     write_cell(allowed.data, out);
-    fprintf(out, "%s | ", key->fallback == NULL ? "required" : key->fallback);
-    fprintf(out, "%s%s%s |\n", key->help, need_text(key->needs), key->is_live ? " (SIGHUP)" : "");
+    fprintf(out, "%s | ", key->fallback == NULL ? _("required") : key->fallback);
+    fprintf(out, "%s%s%s |\n", translate(key->help), need_text(key->needs), key->is_live ? " (SIGHUP)" : "");
 }
 
 void config_write_reference(FILE *out)
 {
-    fprintf(out,
-            ("# Configuration reference\n\nOne INI file. Comments start with `;`. Decimal point, no thousands separator. "
-             "Written by the build from the table of keys in src/config/keys.c. Keys marked (SIGHUP) change in operation when "
-             "heaved gets that signal and the whole file is right; the others need a restart.\n"));
+    const char *languages = strcmp(translate_language(), "en") == 0 ? "English | [\u4e2d\u6587](configuration.zh-CN.md)"
+                                                                    : "[English](configuration.md) | \u4e2d\u6587";
+    fprintf(
+        out, "# %s\n\n%s\n\n%s\n", _("Configuration reference"), languages,
+        _("One INI file. Comments start with `;`. Decimal point, no thousands separator. Written by the build from the table of "
+          "keys in src/config/keys.c. Keys marked (SIGHUP) change in operation when heaved gets that signal and the whole file "
+          "is right; the others need a restart."));
     for (size_t i = 0; i < config_section_count; i++) {
         const config_section_t *section = &config_sections[i];
-        fprintf(out, "\n## [%s]\n\n%s%s\n\n", section->name, section->help, need_text(section->needs));
-        fputs(config_startup_is_list(section) ? config_startup_help
-                                              : ("| key | allowed | default | meaning |\n| --- | --- | --- | --- |\n"),
-              out);
+        fprintf(out, "\n## [%s]\n\n%s%s\n\n", section->name, translate(section->help), need_text(section->needs));
+        if (config_startup_is_list(section)) {
+            fputs(translate(config_startup_help), out);
+            continue;
+        }
+        fprintf(out, "%s\n| --- | --- | --- | --- |\n", _("| key | allowed | default | meaning |"));
         for (size_t k = 0; k < config_key_count; k++) {
             if (strcmp(config_keys[k].section, section->name) == 0) {
                 write_row(&config_keys[k], out);

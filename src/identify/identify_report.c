@@ -174,8 +174,7 @@ static void print_table(const identify_report_t *self, const advice_t *advice)
         printf("%8.2f  %6.3f  %6.2f  %9.1f  %7.2f  %9.3f\n", at->hz, at->gain, 20 * log10(at->gain), at->phase_deg,
                -at->phase_deg / 360 / at->hz * 1000, at->coherence);
     }
-    printf("\n%-8s  %7s  %6s  %9s  %9s  %9s  %9s  %9s\n", "", _("lag ms"), "gain", _("-3 dB Hz"), _("-90deg Hz"), "following",
-           "RMS", "hysteresis");
+    printf("\n%s\n", _("           lag ms    gain   -3 dB Hz  -90deg Hz  following        RMS  hysteresis"));
     for (unsigned i = 0; i < self->channels; i++) {
         const response_t *found = &self->channel[i].response;
         const bool is_drive = i > 0 || !self->is_posed;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT
- * config_reference.c - prints docs/configuration.md as the table of keys has it.
+ * config_reference.c - prints docs/configuration.md as the table of keys has it, in the language of the environment.
  */
 #include <stdlib.h>
 
+#include "common/translate.h"
 #include "config/config.h"
 #include "heave/status.h"
 
@@ -14,6 +15,8 @@ void hv_assert_failed(const char *file, int line)
 
 int main(void)
 {
+    translate_begin();
     config_write_reference(stdout);
+    translate_end();
     return fflush(stdout) == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -314,8 +314,8 @@ def recipes():
         assert listed == holding, f"{title}: not in the list: {sorted(holding - listed)}; in the list, but without the examples: {sorted(listed - holding)}"
 
 
-def reference(program, page):
-    wanted = run(program).stdout
+def reference(program, page, **variables):
+    wanted = run(program, env={**os.environ, **variables}).stdout
     got = (TOP / page).read_text(encoding="utf-8")
     assert got == wanted, f"{page} is not up to date: {program} > {page}"
 
@@ -362,7 +362,9 @@ def main():
     with suite.case("docs/demo.svg shows what heaved does"):
         picture(arguments.heaved)
     with suite.case("docs/configuration.md is what the table of keys says"):
-        reference(arguments.reference, "docs/configuration.md")
+        reference(arguments.reference, "docs/configuration.md", LC_ALL="C")
+    with suite.case("docs/configuration.zh-CN.md is what it says in Chinese"):
+        reference(arguments.reference, "docs/configuration.zh-CN.md", LANGUAGE="", LC_ALL="zh_CN.UTF-8", HEAVE_LOCALES=str(Path(arguments.build) / "locale"))
     with suite.case("docs/testing.md lists the clock tests"):
         lists_clock_tests(arguments.build)
     with suite.case("docs/faults.md is what the table of faults says"):

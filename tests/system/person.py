@@ -97,6 +97,7 @@ class Person:
 
     def of_setup(self):
         return [(r"Which cylinder has moved", lambda _: str(self.moved()[0])),
+                (r"look at all of them again l again, over 20 mm each", "l"),
                 (r"longer or shorter", lambda _: "l" if self.moved()[1] > 0 else "s"),
                 (r"By how many mm has cylinder", lambda _: f"{abs(self.moved()[1]):.0f}"),
                 (r"Has cylinder (\d), and no other, become (longer|shorter) by ([0-9.]+)",
@@ -165,9 +166,14 @@ class Person:
         return self.process.poll() is None
 
     def run(self):
+        """To the end of the conversation. Where the person does not know what to answer nothing is left running."""
         end = time.monotonic() + self.seconds
-        while self.look():
-            assert time.monotonic() < end, f"not done in {self.seconds} s:\n{self.text[-60000:]}"
+        try:
+            while self.look():
+                assert time.monotonic() < end, f"not done in {self.seconds} s:\n{self.text[-60000:]}"
+        except AssertionError:
+            self.kill()
+            raise
         return self.end()
 
     def end(self):
