@@ -160,6 +160,8 @@ static void drop_limits(ini_text_t *out)
 static void set_geometry(const setup_t *self, ini_text_t *out)
 {
     const char *geometry = setup_get(self, "geometry");
+    set_answer(self, out, "retracted", "geometry", "retracted_length_mm", _("from joint to joint, fully in"));
+    set_answer(self, out, "stroke", "geometry", "stroke_mm", NULL);
     if (geometry == NULL || strcmp(geometry, "k") == 0) {
         return;
     }
@@ -174,8 +176,6 @@ static void set_geometry(const setup_t *self, ini_text_t *out)
             set_joints(self, out, k_sets[i]);
         }
     }
-    set_answer(self, out, "retracted", "geometry", "retracted_length_mm", _("from joint to joint, fully in"));
-    set_answer(self, out, "stroke", "geometry", "stroke_mm", NULL);
     ini_text_drop(out, "geometry", "zero_height_mm");
     ini_text_drop(out, "pose", "neutral");
     drop_limits(out);

@@ -29,6 +29,11 @@ static unsigned if_not_kept(const setup_t *self)
 {
     return !answers_is(self, "geometry", "k");
 }
+/* Of a file that is kept only where the cylinders came to their ends elsewhere. */
+static unsigned if_lengths(const setup_t *self)
+{
+    return if_not_kept(self) || setup_get(self, "lengths.again") != NULL;
+}
 static unsigned if_sizes_6(const setup_t *self)
 {
     return answers_is(self, "geometry", "s") && setup_cylinders(self) == 6u;
@@ -478,13 +483,13 @@ const step_t steps_geometry[] = {
      .help = PICTURES_HELP},
     {.key = "retracted",
      MM_ROW,
-     .times = if_not_kept,
+     .times = if_lengths,
      .least = 50,
      .most = 8000,
      .text = N_("Length of a cylinder that is fully in, from joint to joint?")},
     {.key = "stroke",
      MM_ROW,
-     .times = if_not_kept,
+     .times = if_lengths,
      .least = 10,
      .most = 4000,
      .text = N_("Stroke of a cylinder, from end to end?")},

@@ -258,7 +258,6 @@ static void say_stopped(const setup_t *self, setup_question_t *out)
     char *rest = NULL;
     const unsigned cylinder = (unsigned)strtoul(end != NULL ? end + strcspn(end, " ") : "", &rest, 10);
     const double at_mm = strtod(rest, NULL);
-    const bool is_asked = setup_get(self, "stroke") != NULL;
     (void)snprintf(
         out->text, sizeof out->text,
         out->index == END_IN
@@ -267,8 +266,7 @@ static void say_stopped(const setup_t *self, setup_question_t *out)
             : _("Cylinder %u went no further out than to %.1f mm of its %g mm. Its stroke, its length when it is fully in, or "
                 "a length that was measured is wrong."),
         cylinder, at_mm, configure_stroke(self, cylinder));
-    out->choices = is_asked ? N_("a try again|s give the stroke and the length again|m measure the cylinders again")
-                            : N_("a try again|m measure the cylinders again|n note it: the file is to be mended");
+    out->choices = N_("a try again|s give the stroke and the length again|m measure the cylinders again");
 }
 static void accept_stopped(setup_t *self, unsigned index, const char *text)
 {
@@ -284,6 +282,7 @@ static void accept_stopped(setup_t *self, unsigned index, const char *text)
         answers_drop(self, "geometry.check");
         answers_drop(self, "limits");
         answers_drop(self, "ends.");
+        (void)answers_set(self, "lengths.again", "y");
     } else if (strcmp(text, "m") == 0) {
         measure_anew(self);
     } else if (strcmp(text, "a") == 0) {

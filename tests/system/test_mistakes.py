@@ -61,6 +61,13 @@ def misread(cylinder, off):
     return lambda machine: [(rf"How long is cylinder {cylinder} now", first(lambda _: f"{machine.eyes.length(cylinder) + off:.2f}"))]
 
 
+def begun_from_a_file(machine):
+    """The file has a stroke that the machine has not; its joints are right."""
+    begun = Path(machine.folder.name) / "begun.ini"
+    begun.write_text(machine.truth.read_text(encoding="utf-8").replace(f"stroke_mm = {STROKE}", "stroke_mm = 180"), encoding="utf-8")
+    return [(r"From what do you want to begin", str(begun)), (r"where the joints are", "k"), (r"Lead:|counts has one turn", ""), (r"Limits of the axes", "y")]
+
+
 def numbered(name, said, called):
     return Mistake(name, said, kind="numbers", called=called)
 
@@ -78,6 +85,7 @@ MISTAKES = [
     Mistake("encoders that lose their counts taken for absolute ones", "encoders lose their counts", kind="encoders", more="homing_method = 17\n",
             rules=lambda machine: [(r"switch the supply of the drives off", first(power_cycle(machine))), (r"Have the cylinders really moved", "h"), (r"Homing method", "17")]),
     Mistake("stroke 180 for 120", "went no further out", kind="stroke", rules=lambda _: [(r"Stroke of a cylinder", first("180"))]),
+    Mistake("a file with a stroke of 180 for 120", "went no further out", kind="stroke", rules=begun_from_a_file),
     Mistake("fully in 30 mm too long", "went no further out", kind="stroke", rules=lambda _: [(r"that is fully in", first(f"{RETRACTED + 30}"))]),
     Mistake("fully in 30 mm too short", "went no further in", kind="stroke", rules=lambda _: [(r"that is fully in", first(f"{RETRACTED - 30}"))]),
 ]
@@ -86,6 +94,7 @@ CHOSEN = [  # each kind once, and what disturbs what
     ("numbered the other way round", "drive 4 runs backwards", "the length of 1 misread by -8 mm", "fully in 30 mm too short"),
     ("all counts x 0.5", "cables 2 and 5 exchanged", "fully in 30 mm too long", "the length of 5 misread by 20 mm"),
     ("encoders that lose their counts taken for absolute ones", "the screw of 3 x 2.0", "the front four legs off"),
+    ("a file with a stroke of 180 for 120", "cables 4 and 6 exchanged"),
 ]
 
 
