@@ -144,7 +144,7 @@ const config_key_t config_keys[] = {
      .help = "who brings the platform up: an operator's request, or heaved by itself once after each start, also where a service manager "
              "starts it again after a crash"},
     {KEY("platform", "life_file"), AT(life_file), .type = &config_type_path, .unit = "", .fallback = "none", .words = "none",
-     .help = "file, and beside it FILE.2 and FILE.machine, that keeps hours, way and cycles of each axis for good, and what was commissioned; none: nothing is kept, unless a "
+     .help = "file, and beside it `FILE.2` and `FILE.machine`, that keeps hours, way and cycles of each axis for good, and what was commissioned; none: nothing is kept, unless a "
              "service manager has given a state directory"},
     {KEY("platform", "approved"), AT(approved), .type = &config_type_label, .unit = "", .fallback = "none", .is_live = true,
      .help = "hash of the approved configuration, as --check shows it: any other moves nothing before `heavectl acknowledge`; not "

@@ -27,4 +27,7 @@ typedef struct {
 /** One chapter after the other; each ends with a row without a key. */
 extern const step_t steps_geometry[], steps_drives[], steps_legs[], steps_zero[], steps_end[], steps_moves[];
 
+/** Stroke and length of the cylinders are asked for once more, and what follows from them. */
+void steps_ask_lengths(setup_t *self);
+
 #endif

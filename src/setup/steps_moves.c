@@ -277,12 +277,7 @@ static void accept_stopped(setup_t *self, unsigned index, const char *text)
                    answers_get_nth(self, "ends.way", index));
     answers_note(self, note);
     if (strcmp(text, "s") == 0) {
-        answers_drop(self, "stroke");
-        answers_drop(self, "retracted");
-        answers_drop(self, "geometry.check");
-        answers_drop(self, "limits");
-        answers_drop(self, "ends.");
-        (void)answers_set(self, "lengths.again", "y");
+        steps_ask_lengths(self);
     } else if (strcmp(text, "m") == 0) {
         measure_anew(self);
     } else if (strcmp(text, "a") == 0) {

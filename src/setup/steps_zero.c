@@ -50,17 +50,47 @@ static void say_length(const setup_t *self, setup_question_t *out)
     (void)self;
 }
 
-static bool check_length(const setup_t *self, unsigned index, const char *text, char error[SETUP_ERROR_MAX])
+/* How far a length may be beyond what was said of the cylinder: joints have play, and tapes. */
+#define BEYOND_MM 5.0
+
+static bool is_beyond(const setup_t *self, unsigned index)
 {
-    const double length_mm = strtod(text, NULL), least_mm = configure_retracted(self, index),
-                 stroke_mm = configure_stroke(self, index);
-    if (length_mm >= least_mm - 5 && length_mm <= least_mm + stroke_mm + 5) {
-        return true;
+    const char *text = answers_get_nth(self, "zero.length", index);
+    const double in_mm = strtod(text != NULL ? text : "", NULL) - configure_retracted(self, index);
+    return in_mm < -BEYOND_MM || in_mm > configure_stroke(self, index) + BEYOND_MM;
+}
+static void say_beyond(const setup_t *self, setup_question_t *out)
+{
+    const double least_mm = configure_retracted(self, out->index);
+    (void)snprintf(out->text, sizeof out->text,
+                   _("Cylinder %u was measured as %s mm long. It is %g mm long fully in, and %g mm fully out, as it was said. "
+                     "What is wrong?"),
+                   out->index, answers_get_nth(self, "zero.length", out->index), least_mm,
+                   least_mm + configure_stroke(self, out->index));
+}
+static void accept_beyond(setup_t *self, unsigned index, const char *text)
+{
+    char key[SETUP_ANSWER_MAX];
+    if (strcmp(text, "s") == 0) {
+        answers_note(self,
+                     N_("A cylinder was longer or shorter than its stroke lets it be: stroke and length were given again."));
+        steps_ask_lengths(self);
+        return;
     }
-    (void)snprintf(error, SETUP_ERROR_MAX,
-                   _("%g mm: cylinder %u is %g mm long when it is fully in, and %g mm fully out. From joint to joint?"),
-                   length_mm, index, least_mm, least_mm + stroke_mm);
-    return false;
+    (void)snprintf(key, sizeof key, "zero.length.%u", index);
+    answers_drop(self, key);
+    answers_drop(self, "zero.beyond.");
+}
+
+void steps_ask_lengths(setup_t *self)
+{
+    answers_drop(self, "stroke");
+    answers_drop(self, "retracted");
+    answers_drop(self, "geometry.check");
+    answers_drop(self, "limits");
+    answers_drop(self, "zero.beyond.");
+    answers_drop(self, "ends.");
+    (void)answers_set(self, "lengths.again", "y");
 }
 
 static void accept_same(setup_t *self, unsigned index, const char *text)
@@ -125,12 +155,21 @@ const step_t steps_zero[] = {
      .kind = SETUP_NUMBER,
      .unit = "mm",
      .times = each,
+     .group = 7,
      .is_repeated = true,
      .say = say_length,
-     .check = check_length,
      .least = 10,
      .most = 12000,
      .help = N_("From the centre of the lower joint to the centre of the upper one.")},
+    {.key = "zero.beyond",
+     .kind = SETUP_CHOICE,
+     .group = 7,
+     .times = each,
+     .is_repeated = true,
+     .applies = is_beyond,
+     .say = say_beyond,
+     .took = accept_beyond,
+     .choices = N_("l this length: measure the cylinder again|s the others: give the stroke and the length again")},
     {.key = "zero.same", .kind = SETUP_DO, .times = if_bus, .act = SETUP_ACT_SAME, .say = say_counts, .took = accept_same},
     {.key = "zero.pose", .kind = SETUP_DO, .times = if_bus, .act = SETUP_ACT_POSE, .stage = SETUP_STAGE_FULL},
     {.key = "zero.right",

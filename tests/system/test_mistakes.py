@@ -12,6 +12,8 @@ from person import Eyes
 from test_setup import RETRACTED, Machine, judge
 
 STROKE, START = 120, ("--start", "50")  # a short one: both ends are soon there
+BEYOND = r"was measured as [0-9.]+ mm long. It is [0-9.]+ mm long fully in"
+BEYOND_OUT, BEYOND_IN = f"went no further out|{BEYOND}", f"went no further in|{BEYOND}"
 TIMES = {2.0: "2 times", 0.5: "1/2 of"}
 
 
@@ -84,10 +86,10 @@ MISTAKES = [
     *(Mistake(f"the length of {k} misread by {off} mm", "plate did not stand as the measured lengths said", kind="zero", rules=misread(k, off)) for k, off in ((1, -8), (5, 20))),
     Mistake("encoders that lose their counts taken for absolute ones", "encoders lose their counts", kind="encoders", more="homing_method = 17\n",
             rules=lambda machine: [(r"switch the supply of the drives off", first(power_cycle(machine))), (r"Have the cylinders really moved", "h"), (r"Homing method", "17")]),
-    Mistake("stroke 180 for 120", "went no further out", kind="stroke", rules=lambda _: [(r"Stroke of a cylinder", first("180"))]),
-    Mistake("a file with a stroke of 180 for 120", "went no further out", kind="stroke", rules=begun_from_a_file),
-    Mistake("fully in 30 mm too long", "went no further out", kind="stroke", rules=lambda _: [(r"that is fully in", first(f"{RETRACTED + 30}"))]),
-    Mistake("fully in 30 mm too short", "went no further in", kind="stroke", rules=lambda _: [(r"that is fully in", first(f"{RETRACTED - 30}"))]),
+    Mistake("stroke 180 for 120", BEYOND_OUT, kind="stroke", rules=lambda _: [(r"Stroke of a cylinder", first("180"))]),
+    Mistake("a file with a stroke of 180 for 120", BEYOND_OUT, kind="stroke", rules=begun_from_a_file),
+    Mistake("fully in 30 mm too long", BEYOND_OUT, kind="stroke", rules=lambda _: [(r"that is fully in", first(f"{RETRACTED + 30}"))]),
+    Mistake("fully in 30 mm too short", BEYOND_IN, kind="stroke", rules=lambda _: [(r"that is fully in", first(f"{RETRACTED - 30}"))]),
 ]
 CHOSEN = [  # each kind once, and what disturbs what
     ("the front two legs off", "cables 1 and 2 exchanged", "stroke 180 for 120"),
@@ -110,6 +112,7 @@ def made(*mistakes):
             machine.eyes.learn()
             return "r"
         rules = [(r"r number them so|The cylinders were numbered", learn), (r"went no further", "s")]
+        rules.append((r"What is wrong", "s"))
         rules += [rule for one in mistakes if one.rules for rule in one.rules(machine)]
         code, screen = machine.person(*rules, seconds=1200).run()
         report = Path(f"{machine.file}.report.txt")

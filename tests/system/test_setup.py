@@ -29,7 +29,6 @@ BIN = Path(sys.argv[1])
 BASE, BASE_SPREAD, PLATE, PLATE_SPREAD, RETRACTED, STROKE = 1100, 16, 900, 18, 1300, 400
 WRONG = ("--swap", "2,5", "--reverse", "4", "--lead", "3=2.0", "--start", "120")
 KILLS = 8
-SEED = int(sys.argv[3]) if len(sys.argv) > 3 else 5
 WATCH_S = 1.5
 STILL_MM = 0.002
 REST_S = 0.25 + 0.02 + 0.15  # the hand counts for 250 ms; 2 mm/s at 100 mm/s^2; the drive's own lag, and a busy machine
@@ -211,7 +210,7 @@ def interrupt(person, machine, is_stopped):
 
 def killed():
     """SIGKILL or SIGSTOP at any moment, also while it moves: everything rests soon, its heaved ends, no answer is lost, and it goes on to the right end."""
-    chance = random.Random(SEED)
+    chance = random.Random(int(sys.argv[3]) if len(sys.argv) > 3 else 5)
     with Machine(*WRONG) as machine:
         rests, in_motion, answers, person = [], 0, 0, None
         for n in range(KILLS):
