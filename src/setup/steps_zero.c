@@ -117,7 +117,9 @@ static void say_pose(const setup_t *self, setup_question_t *out)
 static void accept_pose(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
-    if (strcmp(text, "n") == 0) {
+    if (strcmp(text, "l") == 0) {
+        answers_note(self, N_("The plate did not stand as the lengths say, though they were right: see what the tilts showed."));
+    } else if (strcmp(text, "n") == 0) {
         answers_note(self, N_("The plate did not stand as the measured lengths said; they were measured again."));
         answers_drop(self, "zero.counts");
         answers_drop(self, "zero.length.");
@@ -177,7 +179,8 @@ const step_t steps_zero[] = {
      .times = if_bus,
      .say = say_pose,
      .took = accept_pose,
-     .choices = N_("y yes|n no: measure the cylinders again"),
+     .choices =
+         N_("y yes|n no: measure the cylinders again|l no, but the lengths are right: go on, tilts show how they are numbered"),
      .help =
          N_("If the lengths are right and the plate stands otherwise, the joints are wrong: \"back\" as far as their chapter.")},
     {.key = NULL},

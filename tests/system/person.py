@@ -62,6 +62,7 @@ class Person:
         self.answered = []  # questions, with what was answered
         self.before, self.after, self.is_held = {}, {}, False
         self.plate_then, self.plate_now = [0.0] * 6, [0.0] * 6
+        self.said_of_the_plate = None
         self.relay_until, self.relays = None, set()  # a relay is held for a second, and watched
         self.works = {}  # what the screen asks the person to work, with how
         self.text, self.read = "", 0
@@ -88,8 +89,10 @@ class Person:
         return (leg, ways[leg]) if abs(ways[leg]) > 0.3 else (0, 0.0)
 
     def plate_is_so(self, question):
+        """Who has measured twice is sure of the lengths."""
         said = [float(number) for number in re.findall(r"-?\d+\.\d+", question)]
-        return "y" if max(abs(a - b) for a, b in zip(said, self.eyes.plate())) < 1 else "n"
+        is_again, self.said_of_the_plate = said == self.said_of_the_plate, said
+        return "y" if max(abs(a - b) for a, b in zip(said, self.eyes.plate())) < 1 else "l" if is_again else "n"
 
     def has_risen(self, way):
         up, *others = (now - then for now, then in zip(self.plate_now, self.plate_then))
