@@ -43,7 +43,7 @@ typedef enum {
     CIA402_UNGUARDED = 0x1000A,      /**< a watchdog of the drive is off: it would not stop by itself */
     CIA402_NO_HEARTBEAT = 0x1000B,   /**< never sends one */
     CIA402_NO_MODE = 0x1000C,        /**< 6061h does not show the mode */
-    CIA402_NO_START = 0x1000D,       /**< does not become operational, or its TPDO is not what was mapped */
+    CIA402_NO_START = 0x1000D,       /**< does not become operational, or sends no TPDO */
     CIA402_NO_POWER = 0x1000E,       /**< does not switch on in time */
     CIA402_NO_TORQUE = 0x1000F,      /**< does not enable operation, or does not follow, in time */
     CIA402_REMOTE_OFF = 0x10010,     /**< under local control (bit 9 of 6041h) */
@@ -59,6 +59,8 @@ typedef enum {
     CIA402_NO_SUCH_HOMING = 0x1001A, /**< 60E3h does not list the homing method */
     CIA402_LOST_NODE = 0x1001B,      /**< another axis of its node was lost, and the node is set up again */
     CIA402_GUARDED_LATE = 0x1001C,   /**< its watchdog of the gateway is on, with more than twice the time that it has to have */
+    CIA402_SHORT_TPDO = 0x10021,     /**< its TPDO has less bytes than were mapped */
+    CIA402_HOMING_LATE = 0x10022,    /**< homing does not end in time */
     CIA402_OTHER_SYNC = DRIVE_CODE_MASTER_FIRST,    /**< another master is on the bus: SYNC, */
     CIA402_OTHER_NMT = 0x1001E,                     /**< NMT to our drives, */
     CIA402_OTHER_COMMAND = 0x1001F,                 /**< an RPDO of our drives, */
@@ -164,6 +166,7 @@ typedef struct {
     cia402_maps_t commands;    /**< RPDOs: with 6040h, and 607Ah or 60C1h:01; of channel 0, others are at their distance */
     cia402_maps_t answers;     /**< TPDOs: with 6041h and 6064h */
     uint8_t answer_every;      /**< SYNCs between two answers of a drive, [0, CIA402_ANSWER_EVERY_MAX]; 0 as 1. Not in PP */
+    uint8_t csp_control_bits;  /**< of 6040h, set while a drive follows set-points in CSP: any of CIA402_CSP_CONTROL_BITS */
     uint8_t telemetry;         /**< additional values that drives send: bits DRIVE_TELLS_... */
     uint8_t telemetry_every;   /**< SYNCs between two telemetry PDOs, [1, 240] if there is telemetry */
     bool is_guarded;           /**< node guarding in place of heartbeats, of both sides: for drives that have none */
@@ -177,6 +180,7 @@ typedef struct {
 } cia402_config_t;
 
 #define CIA402_ANSWER_EVERY_MAX 10u
+#define CIA402_CSP_CONTROL_BITS 0x70u /**< 4 to 6, of which CiA 402 leaves the meaning to each mode, and CSP has none */
 
 /** Phase of a drive's start-up; private. */
 typedef enum {
@@ -191,7 +195,7 @@ typedef enum {
 } cia402_phase_t;
 
 /** Which job walks through the table of objects; private. */
-typedef enum { CIA402_JOB_NONE, CIA402_JOB_SETUP, CIA402_JOB_MODE, CIA402_JOB_ERROR } cia402_job_t;
+typedef enum { CIA402_JOB_NONE, CIA402_JOB_SETUP, CIA402_JOB_MODE, CIA402_JOB_ERROR, CIA402_JOB_RESET } cia402_job_t;
 
 /** A walk through some rows of the table of objects; private. */
 typedef struct {
@@ -259,6 +263,12 @@ typedef struct {
     uint8_t awaited;         /* SYNCs that no TPDO has answered yet, saturates */
     uint8_t surplus;         /* TPDOs without a request, saturates */
     uint8_t plain_syncs;     /* SYNCs since the last of these, saturates */
+    uint8_t changes;         /* consecutive answers with an additional one that showed a change before them, saturates */
+    bool has_extra;          /* an additional answer came since the last awaited one, and showed another statusword */
+    bool has_short_answer;   /* a TPDO since the last whole answer was too short */
+    bool is_reset_asked;     /* the operator resets; a fault may keep the drive from becoming operational */
+    bool hides_mode;         /* shows no mode in 6061h without torque */
+    uint16_t plain_word;     /* statusword of the last awaited answer */
     bool is_reset_done;
     bool has_found;
     bool is_asking; /* uses the SDO server of its node */
@@ -283,6 +293,7 @@ typedef struct {
     uint8_t watch_answers[CIA402_WATCHES]; /* consecutive answers with the condition, saturates */
     bool has_followed;                     /* bit 12 was set since operation was enabled */
     bool had_voltage;                      /* bit 4 was set since operation was enabled */
+    bool has_shown_mode;                   /* 6061h was the mode since operation was enabled */
     bool has_answer;                       /* a TPDO came since the last poll */
     uint16_t statusword;
     int8_t mode_shown;
@@ -296,18 +307,21 @@ typedef struct {
     bool has_operated; /* operation was enabled since its stage began */
     cia402_goal_t goal;
     uint16_t word;
-    uint8_t word_syncs;  /* since it changed, saturates */
-    uint8_t reset_syncs; /* SYNCs since a fault reset began, 0 = none */
-    uint64_t reset_until_us;
-    uint64_t operating_us; /* operation enabled since, 0 = not */
-    uint64_t stopping_us;  /* quick stop since, 0 = not */
-    uint32_t own_fault;    /* error found by this driver: cia402_trouble_t or a code of the standard; 0 = none */
-    drive_guard_t guard;   /* distances, if own_fault is about set-points */
-    uint16_t error_code;   /* the drive's own */
+    uint8_t word_syncs;      /* since it changed, saturates */
+    uint8_t reset_syncs;     /* SYNCs since a fault reset began, saturates; 0 = none */
+    uint64_t reset_until_us; /* a request is valid until then; while it is carried out, bit 7 is set until then at most */
+    uint64_t operating_us;   /* operation enabled since, 0 = not */
+    uint64_t stopping_us;    /* quick stop since, 0 = not */
+    uint32_t own_fault;      /* error found by this driver: cia402_trouble_t or a code of the standard; 0 = none */
+    drive_guard_t guard;     /* distances, if own_fault is about set-points */
+    uint16_t error_code;     /* the drive's own */
     bool is_error_read;
     q32_t sent_q32;
     int32_t target_counts;
     cia402_homing_t homing;
+    int32_t stand_counts; /* homing: where it has been for the time since */
+    uint64_t stand_us;
+    bool was_without_zero; /* bit 12 was not set since homing was started */
     bool is_homed;
     bool has_sent;
     bool was_faulty;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * sdo.h - SDO client for one CANopen node (CiA 301): reads and writes one object at a time, expedited or in segments.
- * Owns no bus and no clock: frames and times are arguments. Drops late answers and repeated frames. A transfer without an answer
- * is aborted, and repeated after a pause of one time-out. Nothing blocks.
+ * Owns no bus and no clock: frames and times are arguments. Drops repeated frames. A transfer without an answer is aborted, and
+ * repeated after a pause of one time-out. An answer of one frame that comes in this pause still counts, so a slow node has twice
+ * the time-out. Answers shorter than 8 bytes count if they have all bytes that are in use. Nothing blocks.
  */
 #ifndef HEAVE_SDO_H
 #define HEAVE_SDO_H
@@ -15,12 +16,12 @@ typedef enum {
     SDO_IDLE,
     SDO_BUSY,
     SDO_DONE,    /**< read: value and size are valid */
-    SDO_ABORTED, /**< abort_code says why */
+    SDO_ABORTED, /**< abort_code says why: the node's, or what was wrong with its answers */
     SDO_SILENT   /**< no answer to any attempt */
 } sdo_state_t;
 
 /** Expected answer; private. */
-typedef enum { SDO_AWAIT_INITIATE, SDO_AWAIT_SEGMENT, SDO_AWAIT_QUIET } sdo_await_t;
+typedef enum { SDO_AWAIT_INITIATE, SDO_AWAIT_SEGMENT } sdo_await_t;
 
 /** A client; read state, abort_code, value and size, the rest is private. */
 typedef struct {
@@ -35,9 +36,11 @@ typedef struct {
     uint8_t tries_left;
     bool is_read;
     bool is_toggled;
+    bool is_quiet;    /* given up; the pause before the next attempt */
     bool has_request; /* waits to be sent */
     uint8_t at;       /* bytes of value that are done */
     sdo_await_t await;
+    uint32_t odd_code; /* what was wrong with an answer that could not be used; 0 = there was none */
     uint8_t request[8];
     uint32_t timeout_us;
     uint64_t deadline_us;

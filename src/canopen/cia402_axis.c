@@ -13,17 +13,16 @@
 #define LEAVING_US         300000u  /* a lost drive is told to stop for so long, then set up again */
 #define QUICK_STOP_US      5000000u /* a drive that stays in quick stop gets its voltage taken after this */
 #define RESET_US           1000000u /* after a request, to see the drive in fault */
+#define RESET_LOW_SYNCS    2u       /* bit 7 low, so that it has an edge, */
+#define RESET_HIGH_SYNCS   2u       /* high for these at least, and until the drive has left its fault, */
+#define RESET_HIGH_US      250000u  /* or so long: some drives need 100 ms */
+#define CHANGES_MAX        8u       /* one drive does not change its state at so many SYNCs in a row */
 #define FOLLOWS_US         500000u  /* a drive in its mode that does not set bit 12 is believed after this */
 #define PLAIN_SYNCS        50u      /* after these, answers that nobody asked for are forgotten */
 #define BOOTS_APART_US     10000u   /* no drive starts twice in so short a time */
 #define LIVE_ANSWERS       3u /* to the SYNC before a set, to the one at which it acts, and to the next one, which shows it */
 #define NMT_STATE_BOOT     0x00u
 #define NMT_TOGGLE         0x80u
-
-/* Controlwords of the way through a fault reset, one per SYNC: bit 7 low, high, low. */
-static const uint16_t k_reset_words[] = {0, 0, CIA402_WORD_RESET, CIA402_WORD_RESET, 0};
-
-#define RESET_WORDS (sizeof k_reset_words / sizeof k_reset_words[0])
 
 cia402_state_t cia402_axis_state(const cia402_axis_t *self)
 {
@@ -68,6 +67,7 @@ void cia402_axis_reset(cia402_drive_t drive)
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->warned_object = 0;
     if (self->phase == CIA402_REFUSED) {
+        self->is_reset_asked = self->trouble == CIA402_NO_START;
         self->is_reset_done = false;
         self->starts = 0;
         self->mutes = 0;
@@ -102,17 +102,39 @@ HV_WRAPS void cia402_axis_receive_position(cia402_drive_t drive, uint32_t bits)
     }
 }
 
-/* One answer per SYNC, or at every so manyth; more are those of another drive. */
-static void count_answer(cia402_drive_t drive)
+static void count_surplus(cia402_axis_t *self)
+{
+    self->surplus = self->surplus < CIA402_SURPLUS_MAX ? (uint8_t)(self->surplus + 1u) : self->surplus;
+    self->plain_syncs = 0;
+}
+
+/* One answer per SYNC, or at every so manyth. Some drives send one more when their statusword changes, and the next awaited one
+ * still shows the change. All others are those of another drive, which shows a statusword of its own every time. */
+void cia402_axis_count_answer(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     const uint8_t every = cia402_answer_every(drive.config);
-    if (self->awaited >= every) {
-        self->awaited = (uint8_t)(self->awaited - every);
-    } else {
-        self->surplus = self->surplus < CIA402_SURPLUS_MAX ? (uint8_t)(self->surplus + 1u) : self->surplus;
-        self->plain_syncs = 0;
+    const bool is_change = self->statusword != self->plain_word;
+    if (!cia402_axis_is_commanded(self)) {
+        return;
     }
+    if (self->awaited < every) {
+        if (is_change && !self->has_extra && self->changes < CHANGES_MAX) {
+            self->has_extra = true;
+            self->changes++;
+        } else {
+            count_surplus(self);
+        }
+        return;
+    }
+    self->awaited = (uint8_t)(self->awaited - every);
+    if (!self->has_extra) {
+        self->changes = 0;
+    } else if (!is_change) {
+        count_surplus(self);
+    }
+    self->has_extra = false;
+    self->plain_word = self->statusword;
 }
 
 bool cia402_axis_is_commanded(const cia402_axis_t *self)
@@ -127,14 +149,13 @@ void cia402_axis_note_answer(cia402_drive_t drive, unsigned n, uint8_t all)
         return;
     }
     if (n == 0 && self->phase == CIA402_STARTING && !self->has_answered) {
-        self->awaited = 0; /* SYNCs from before it was started get no answer */
-    } else if (n == 0) {
-        count_answer(drive);
+        self->awaited = cia402_answer_every(drive.config); /* SYNCs from before it was started get no answer */
     }
     self->answered = (uint8_t)(self->answered | 1u << n);
     if (self->answered == all) {
         self->answered = 0;
         self->silent_syncs = 0;
+        self->has_short_answer = false;
         self->live_answers = self->live_answers > 0 ? (uint8_t)(self->live_answers - 1u) : 0;
         self->has_answer = true;
         self->has_answered = true;
@@ -165,7 +186,9 @@ void cia402_axis_receive_emergency(cia402_drive_t drive, const can_frame_t *fram
 static void receive_boot(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
-    const bool is_twice = self->boot_us != 0 && drive.now_us - self->boot_us < BOOTS_APART_US;
+    if (self->boot_us != 0 && drive.now_us - self->boot_us < BOOTS_APART_US) {
+        return; /* some say it twice; of two drives with one node id the answers tell */
+    }
     self->boot_us = drive.now_us;
     if (self->phase >= CIA402_CONFIGURING && self->phase <= CIA402_LEAVING) {
         cia402_axis_lose(drive, CIA402_REBOOTED);
@@ -178,9 +201,6 @@ static void receive_boot(cia402_drive_t drive)
     self->live_answers = 0;
     self->emergency.is_over = true;
     cia402_axis_look_for(drive);
-    if (is_twice) {
-        cia402_axis_reject(drive, CIA402_TWICE);
-    }
 }
 
 /* Answers to guarding take turns: one that is repeated is an old one. */
@@ -237,7 +257,7 @@ static cia402_trouble_t find_loss(cia402_drive_t drive)
 {
     const cia402_axis_t *self = drive.axis;
     if (self->silent_syncs > silent_syncs_max(drive)) {
-        return CIA402_LOST_TPDO;
+        return self->has_short_answer ? CIA402_SHORT_TPDO : CIA402_LOST_TPDO;
     }
     if (self->has_heartbeat && self->nmt != CIA402_NMT_OPERATION) {
         return CIA402_LEFT_OPERATIONAL;
@@ -261,7 +281,7 @@ static void step_fault(cia402_drive_t drive)
     self->is_in = false;
     self->goal = CIA402_GOAL_OFF;
     if (self->reset_until_us > drive.now_us && self->reset_syncs == 0) {
-        self->reset_until_us = 0;
+        self->reset_until_us = drive.now_us + RESET_HIGH_US;
         self->reset_syncs = 1;
     }
     if (self->error_code == 0 && !self->is_error_read && self->setup.job == CIA402_JOB_NONE) {
@@ -373,22 +393,32 @@ static uint16_t wanted_word(cia402_drive_t drive, uint16_t mode_bits)
     return state == CIA402_OPERATION_ENABLED && drive.axis->goal == CIA402_GOAL_OPERATE ? word | mode_bits : word;
 }
 
-static bool next_reset_word(cia402_axis_t *self)
+/* Bit 7 low, high, low. */
+static bool next_reset_word(cia402_drive_t drive)
 {
+    cia402_axis_t *self = drive.axis;
     if (self->reset_syncs == 0) {
         return false;
     }
-    self->word = k_reset_words[self->reset_syncs - 1u];
-    self->reset_syncs = self->reset_syncs < RESET_WORDS ? (uint8_t)(self->reset_syncs + 1u) : 0;
+    const bool is_over = cia402_axis_state(self) != CIA402_FAULT || drive.now_us >= self->reset_until_us;
+    const bool is_low = self->reset_syncs <= RESET_LOW_SYNCS;
     self->word_syncs = 0;
+    if (self->reset_syncs > RESET_LOW_SYNCS + RESET_HIGH_SYNCS && is_over) {
+        self->word = 0;
+        self->reset_syncs = 0;
+        self->reset_until_us = 0;
+        return true;
+    }
+    self->word = is_low ? 0 : CIA402_WORD_RESET;
+    self->reset_syncs = self->reset_syncs < UINT8_MAX ? (uint8_t)(self->reset_syncs + 1u) : self->reset_syncs;
     return true;
 }
 
 static void choose_word(cia402_drive_t drive, uint16_t mode_bits)
 {
-    const uint16_t bits = CIA402_WORD_BIT4 | CIA402_WORD_AT_ONCE;
+    const uint16_t bits = CIA402_CSP_CONTROL_BITS; /* of the mode */
     cia402_axis_t *self = drive.axis;
-    if (next_reset_word(self)) {
+    if (next_reset_word(drive)) {
         return;
     }
     const uint16_t wanted = wanted_word(drive, mode_bits);

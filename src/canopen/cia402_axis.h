@@ -40,6 +40,9 @@ bool cia402_axis_is_commanded(const cia402_axis_t *self);
  *  @param all bit N: there is an answer N */
 void cia402_axis_note_answer(cia402_drive_t drive, unsigned n, uint8_t all);
 
+/** The values of the first of them have been taken over. */
+void cia402_axis_count_answer(cia402_drive_t drive);
+
 /** SYNC went out: a TPDO is due, now or at a later one. */
 void cia402_axis_note_sync(cia402_drive_t drive);
 

@@ -65,7 +65,8 @@ static bool is_config_valid(const cia402_config_t *config)
     if (config->axes < 1 || config->axes > DRIVES_MAX || config->master_node < 1 || config->master_node > CIA402_NODE_MAX) {
         return false;
     }
-    if (!are_times_valid(config) || !are_rates_valid(config) || !are_modes_valid(config) || config->pdo_step > 64u) {
+    if (!are_times_valid(config) || !are_rates_valid(config) || !are_modes_valid(config) || config->pdo_step > 64u ||
+        (config->csp_control_bits & ~CIA402_CSP_CONTROL_BITS) != 0) {
         return false;
     }
     for (unsigned k = 0; k < config->axes; k++) {

@@ -106,15 +106,22 @@ const cia402_object_t cia402_objects[] = {
     {.index = 0x6061, .bytes = 1, .deed = CIA402_AWAIT, .source = CIA402_MODE, .trouble = CIA402_NO_MODE},
 
     IF_THERE(0x603F, 0, 2, CIA402_READ, CIA402_CONSTANT, 0),
+
+    /* a fault that keeps the drive from becoming operational: no PDO can reset it */
+    IF_THERE(0x6040, 0, 2, CIA402_WRITE, CIA402_CONSTANT, 0),
+    IF_THERE(0x6040, 0, 2, CIA402_WRITE, CIA402_CONSTANT, CIA402_WORD_RESET),
+    {.deed = CIA402_PAUSE},
+    IF_THERE(0x6040, 0, 2, CIA402_WRITE, CIA402_CONSTANT, 0),
 };
 /* clang-format on */
 
 #define ROWS ((uint8_t)(sizeof cia402_objects / sizeof cia402_objects[0]))
 
-const uint8_t cia402_objects_setup_end = ROWS - 1u;
-const uint8_t cia402_objects_mode_begin = ROWS - 4u;
-const uint8_t cia402_objects_error_begin = ROWS - 1u;
-const uint8_t cia402_objects_error_end = ROWS;
+const uint8_t cia402_objects_setup_end = ROWS - 5u;
+const uint8_t cia402_objects_mode_begin = ROWS - 8u;
+const uint8_t cia402_objects_error_begin = ROWS - 5u;
+const uint8_t cia402_objects_reset_begin = ROWS - 4u;
+const uint8_t cia402_objects_end = ROWS;
 
 bool cia402_period_parts(uint32_t period_us, uint8_t *value, int8_t *exponent)
 {
@@ -307,9 +314,11 @@ uint32_t cia402_object_value(const cia402_object_t *row, const cia402_config_t *
     return row->deed == CIA402_PDO_ON ? value | (setup->value & COB_NO_RTR) : value;
 }
 
+/* A length in a map has at most 64 bits. Some drives mark signed objects with bit 7 of it. */
 uint32_t cia402_object_mask(const cia402_object_t *row)
 {
-    return row->index == 0x1000u ? 0xFFFFu : all_bits(row->bytes);
+    const bool is_mapping = row->index >= RECORDS && row->index < RECORDS_END && (row->index & 0x200u) != 0 && row->sub > 0;
+    return row->index == 0x1000u ? 0xFFFFu : is_mapping ? ~0x80u : all_bits(row->bytes);
 }
 
 bool cia402_object_is_late(const cia402_object_t *row, const cia402_config_t *config, const cia402_setup_t *setup, uint32_t value)

@@ -18,6 +18,7 @@ typedef enum {
     CIA402_PDO_ON,         /**< COB-ID with bit 31 clear and bit 30 as it is, read back */
     CIA402_READ,           /**< read */
     CIA402_PREOPERATIONAL, /**< no object: the drive's heartbeat says pre-operational */
+    CIA402_PAUSE,          /**< no object: so long that the slowest drive has seen what was written last */
     CIA402_SKIP,           /**< nothing */
     CIA402_PDO,            /**< no object: stands for the rows that set up PDO `constant` of the axis (cia402_pdo()) */
     CIA402_LIST            /**< no object: stands for the items of the start-up list whose is_last is `constant` */
@@ -96,7 +97,8 @@ extern const cia402_object_t cia402_objects[];
 extern const uint8_t cia402_objects_setup_end;
 extern const uint8_t cia402_objects_mode_begin;
 extern const uint8_t cia402_objects_error_begin;
-extern const uint8_t cia402_objects_error_end;
+extern const uint8_t cia402_objects_reset_begin; /**< where the row that reads an error ends */
+extern const uint8_t cia402_objects_end;
 
 /** The row that a job is at; of a list, the item; with the index that the object has in the channel of the axis. */
 cia402_object_t cia402_objects_at(const cia402_config_t *config, const cia402_axis_config_t *axis, const cia402_setup_t *setup);

@@ -158,19 +158,26 @@ static void receive_answer(cia402_t *self, unsigned axis, unsigned n, const cia4
 {
     const uint8_t all = (uint8_t)((1u << cia402_map_count(&self->config->answers)) - 1u);
     const bool is_of_node = cia402_map_is_shared(&self->config->answers);
-    cia402_axis_note_answer(cia402_drive(self, axis), n, all);
-    for (unsigned k = 0; is_of_node && k < self->config->axes; k++) {
-        if (k != axis && self->config->axis[k].node == self->config->axis[axis].node) {
+    const unsigned first = is_of_node ? 0 : axis;
+    const unsigned end = is_of_node ? self->config->axes : axis + 1u;
+    for (unsigned k = first; k < end; k++) {
+        if (self->config->axis[k].node == self->config->axis[axis].node) {
             cia402_axis_note_answer(cia402_drive(self, k), n, all);
         }
     }
     apply_entries(self, axis, pdo, frame);
+    for (unsigned k = first; k < end && n == 0; k++) {
+        if (self->config->axis[k].node == self->config->axis[axis].node) {
+            cia402_axis_count_answer(cia402_drive(self, k));
+        }
+    }
 }
 
 static void receive_pdo(cia402_t *self, unsigned axis, unsigned which, const can_frame_t *frame)
 {
     const cia402_pdo_t *pdo = &self->pdo[axis][which];
-    if (pdo->bytes != frame->length) {
+    if (frame->length < pdo->bytes) { /* CiA 301: of a longer one the first bytes count */
+        self->axis[axis].has_short_answer |= which < CIA402_TELEMETRY;
         return;
     }
     if (which < CIA402_TELEMETRY) {

@@ -3,6 +3,7 @@
  */
 #include "cia402_setup.h"
 
+#include "cia402_map.h"
 #include "cia402_objects.h"
 
 #define SDO_TRIES       3u
@@ -12,6 +13,8 @@
 #define AWAIT_PAUSE_US  10000u
 #define AWAIT_US        5000000u
 #define LISTEN_US       1000000u
+#define HIDDEN_US       500000u /* a drive that shows no mode for so long shows it with torque only */
+#define RESET_US        150000u
 #define PREOP_REPEAT_US 100000u
 #define NMT_PREOP       0x80u
 #define NMT_STATE_PREOP 0x7Fu
@@ -22,7 +25,7 @@
 #define ABORT_STATE     0x08000022u
 
 /* What a deed is made of, in order; STEP_END is the last of each. */
-typedef enum { STEP_END, STEP_WRITE, STEP_COMPARE, STEP_KEEP, STEP_POLL, STEP_LISTEN, STEP_SEEK } step_t;
+typedef enum { STEP_END, STEP_WRITE, STEP_COMPARE, STEP_KEEP, STEP_POLL, STEP_LISTEN, STEP_SEEK, STEP_PAUSE } step_t;
 
 #define STEPS_MAX 4u
 
@@ -37,19 +40,31 @@ static const step_t k_steps[][STEPS_MAX] = {
     [CIA402_PDO_ON] = {STEP_KEEP, STEP_WRITE, STEP_COMPARE},
     [CIA402_READ] = {STEP_KEEP},
     [CIA402_PREOPERATIONAL] = {STEP_LISTEN},
+    [CIA402_PAUSE] = {STEP_PAUSE},
 };
 
 static uint8_t end_of(cia402_job_t job)
 {
-    return job == CIA402_JOB_ERROR ? cia402_objects_error_end : cia402_objects_setup_end;
+    if (job == CIA402_JOB_RESET) {
+        return cia402_objects_end;
+    }
+    return job == CIA402_JOB_ERROR ? cia402_objects_reset_begin : cia402_objects_setup_end;
 }
 
 static uint8_t begin_of(cia402_job_t job)
 {
-    if (job == CIA402_JOB_ERROR) {
+    switch (job) {
+    case CIA402_JOB_MODE:
+        return cia402_objects_mode_begin;
+    case CIA402_JOB_ERROR:
         return cia402_objects_error_begin;
+    case CIA402_JOB_RESET:
+        return cia402_objects_reset_begin;
+    case CIA402_JOB_NONE:
+    case CIA402_JOB_SETUP:
+        break;
     }
-    return job == CIA402_JOB_MODE ? cia402_objects_mode_begin : 0;
+    return 0;
 }
 
 void cia402_setup_begin(cia402_axis_t *self, cia402_job_t job, cia402_mode_t mode, uint64_t now_us)
@@ -212,6 +227,15 @@ static bool is_late(const visit_t *self, uint32_t found)
     return self->row.need == CIA402_GUARD && cia402_object_is_late(&self->row, self->config, &self->axis->setup, found);
 }
 
+/* Some drives show their mode (6061h) with torque only. Then it is the answers with torque that have to show it. */
+static bool is_mode_hidden(const visit_t *self, uint32_t found)
+{
+    cia402_axis_t *axis = self->axis;
+    const bool is_none = self->row.deed == CIA402_AWAIT && found == 0 && cia402_map_has_mode(self->config);
+    axis->hides_mode |= is_none && self->now_us - axis->setup.since_us >= HIDDEN_US;
+    return is_none && axis->hides_mode;
+}
+
 static cia402_setup_result_t compare(const visit_t *self)
 {
     const cia402_object_t *row = &self->row;
@@ -219,7 +243,7 @@ static cia402_setup_result_t compare(const visit_t *self)
     const uint32_t found = sdo_value_u32(&axis->sdo);
     const uint32_t wanted = cia402_object_value(row, self->config, self->own, &axis->setup);
     axis->setup.guard_ms = row->index == GUARD_TIME ? (uint16_t)found : axis->setup.guard_ms;
-    if (is_fitting(row, found, wanted) || is_guarding(self, found)) {
+    if (is_fitting(row, found, wanted) || is_guarding(self, found) || is_mode_hidden(self, found)) {
         next_step(self);
         return CIA402_SETUP_BUSY;
     }
@@ -308,6 +332,12 @@ static cia402_setup_result_t go_on(const visit_t *self)
     const sdo_t *sdo = &self->axis->sdo;
     if (step_of(self) == STEP_LISTEN) {
         return listen(self);
+    }
+    if (step_of(self) == STEP_PAUSE) {
+        if (self->now_us - self->axis->setup.since_us >= RESET_US) {
+            next_row(self);
+        }
+        return CIA402_SETUP_BUSY;
     }
     if (!self->axis->setup.is_asked) {
         ask(self);

@@ -13,7 +13,10 @@
 #define MODE_TIMEOUT_US   6000000u
 #define HOMING_BEGIN_US                                                                                                          \
     500000u /* "done" or "failed" at the begin counts only after this time: it may be left from the last homing */
-#define HOMING_BITS (CIA402_STATUS_BIT12 | CIA402_STATUS_REACHED)
+#define HOMING_BITS    (CIA402_STATUS_BIT12 | CIA402_STATUS_REACHED)
+#define HOMING_MOST_US 100000000u /* of all drives; the gateway, which knows no drive by name, waits longer */
+#define STANDS_US      1000000u
+#define STANDS_LONG_US 5000000u
 
 static void enter(cia402_t *self, cia402_stage_t stage)
 {
@@ -121,16 +124,26 @@ static void step_withdraw(cia402_t *self)
 
 static bool is_in_mode(const cia402_axis_t *axis)
 {
-    return axis->setup.job == CIA402_JOB_NONE && axis->mode_shown == (int8_t)axis->setup.mode;
+    const bool is_hidden = axis->hides_mode && axis->mode_shown == 0;
+    return axis->setup.job == CIA402_JOB_NONE && (is_hidden || axis->mode_shown == (int8_t)axis->setup.mode);
+}
+
+/* A drive that is late may show the reason. */
+static cia402_trouble_t reason_of(const cia402_axis_t *axis, cia402_trouble_t why)
+{
+    if (why == CIA402_NO_TORQUE && axis->operating_us != 0 && axis->mode_shown != (int8_t)axis->setup.mode) {
+        return CIA402_NO_MODE;
+    }
+    const bool is_local = (axis->statusword & CIA402_STATUS_REMOTE) == 0;
+    return is_local && why != CIA402_NO_MODE ? CIA402_REMOTE_OFF : why;
 }
 
 /* Reports the drives that have not arrived in time. */
 static void fail_where(cia402_t *self, bool (*is_there)(cia402_t *self, unsigned k), cia402_trouble_t why)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
-        const bool is_local = (self->axis[k].statusword & CIA402_STATUS_REMOTE) == 0;
         if (!is_there(self, k)) {
-            cia402_axis_fail(cia402_drive(self, k), is_local && why != CIA402_NO_MODE ? CIA402_REMOTE_OFF : why);
+            cia402_axis_fail(cia402_drive(self, k), reason_of(&self->axis[k], why));
         }
     }
 }
@@ -246,13 +259,38 @@ static bool may_start(const cia402_t *self, unsigned k)
     return true;
 }
 
-static void step_homing_axis(cia402_t *self, unsigned k)
+/* How long it has been slower than a tenth of the speed that it looks for its zero with. */
+static uint64_t stands_us(cia402_t *self, unsigned k)
+{
+    cia402_axis_t *axis = &self->axis[k];
+    const int64_t moved = (int64_t)axis->actual_counts - axis->stand_counts;
+    const int64_t most = self->config->axis[k].homing_speed[1] / 10u;
+    if (moved > most || moved < -most) {
+        axis->stand_counts = axis->actual_counts;
+        axis->stand_us = self->now_us;
+    }
+    return self->now_us - axis->stand_us;
+}
+
+/* Some drives never set bit 10. They have their zero when bit 12 has come, or was never away, and they stand. */
+static bool has_zero(cia402_t *self, unsigned k)
 {
     cia402_axis_t *axis = &self->axis[k];
     const uint16_t bits = axis->statusword & HOMING_BITS;
+    const uint64_t stood_us = stands_us(self, k);
+    axis->was_without_zero |= (bits & CIA402_STATUS_BIT12) == 0 && axis->word_syncs > 0;
+    return bits == HOMING_BITS ||
+           (bits == CIA402_STATUS_BIT12 && stood_us >= (axis->was_without_zero ? STANDS_US : STANDS_LONG_US));
+}
+
+static void step_homing_axis(cia402_t *self, unsigned k)
+{
+    cia402_axis_t *axis = &self->axis[k];
     if (axis->homing == CIA402_HOMING_WAITING && may_start(self, k)) {
         axis->homing = CIA402_HOMING_STARTED;
-        axis->phase_us = self->now_us;
+        axis->was_without_zero = false;
+        axis->stand_counts = axis->actual_counts;
+        axis->stand_us = axis->phase_us = self->now_us;
         return;
     }
     if (axis->homing != CIA402_HOMING_STARTED && axis->homing != CIA402_HOMING_RUNNING) {
@@ -260,12 +298,15 @@ static void step_homing_axis(cia402_t *self, unsigned k)
     }
     const bool is_error = (axis->statusword & CIA402_STATUS_BIT13) != 0;
     const bool has_begun = axis->homing == CIA402_HOMING_RUNNING || self->now_us - axis->phase_us >= HOMING_BEGIN_US;
+    const bool is_there = has_zero(self, k);
     if (is_error && has_begun) {
         cia402_axis_fail(cia402_drive(self, k), CIA402_HOMING_ERROR);
-    } else if (bits == HOMING_BITS && has_begun) {
+    } else if (is_there && has_begun) {
         axis->homing = CIA402_HOMING_DONE;
         axis->is_homed = true;
-    } else if (bits != HOMING_BITS && !is_error && axis->word_syncs > 0) {
+    } else if (is_late(self, HOMING_MOST_US)) {
+        cia402_axis_fail(cia402_drive(self, k), CIA402_HOMING_LATE);
+    } else if (!is_there && !is_error && axis->word_syncs > 0) {
         axis->homing = CIA402_HOMING_RUNNING;
     }
 }
@@ -389,6 +430,9 @@ uint16_t cia402_stage_mode_bits(const cia402_t *self, unsigned k)
     const cia402_mode_t mode = cia402_mode(self->config, k);
     if (mode == CIA402_MODE_PP) {
         return CIA402_WORD_AT_ONCE | (self->pp_step == 1u ? CIA402_WORD_BIT4 : 0);
+    }
+    if (mode == CIA402_MODE_CSP) {
+        return self->config->csp_control_bits;
     }
     return mode == CIA402_MODE_IP ? CIA402_WORD_BIT4 : 0;
 }

@@ -34,6 +34,7 @@ static void begin_setup(cia402_drive_t drive)
 {
     const unsigned k = (unsigned)(drive.own - drive.config->axis);
     cia402_axis_enter(drive, CIA402_CONFIGURING);
+    drive.axis->hides_mode = false;
     cia402_setup_begin(drive.axis, CIA402_JOB_SETUP, cia402_mode(drive.config, k), drive.now_us);
 }
 
@@ -133,6 +134,9 @@ static void start_node(cia402_drive_t drive)
             other.axis->silent_syncs = 0;
             other.axis->awaited = 0;
             other.axis->surplus = 0;
+            other.axis->changes = 0;
+            other.axis->has_extra = false;
+            other.axis->has_short_answer = false;
             cia402_axis_enter(other, CIA402_STARTING);
         }
     }
@@ -145,6 +149,11 @@ void cia402_start_configuring(cia402_drive_t drive)
     case CIA402_SETUP_BUSY:
         break;
     case CIA402_SETUP_DONE:
+        if (self->is_reset_asked) {
+            self->is_reset_asked = false;
+            cia402_setup_begin(self, CIA402_JOB_RESET, (cia402_mode_t)self->setup.mode, drive.now_us);
+            break;
+        }
         cia402_axis_enter(drive, CIA402_CONFIGURED);
         start_node(drive);
         break;
@@ -183,6 +192,22 @@ static void come_up(cia402_drive_t drive)
     cia402_watch_restart(self);
 }
 
+/* It does not become operational: an error that it has may be the reason. */
+static void reject_start(cia402_drive_t drive)
+{
+    cia402_axis_t *self = drive.axis;
+    if (self->has_short_answer) {
+        cia402_axis_reject(drive, CIA402_SHORT_TPDO);
+    } else if (self->is_error_read) {
+        const uint32_t code = self->setup.value;
+        cia402_axis_reject(drive, CIA402_NO_START);
+        self->trouble_code = self->trouble_code != 0 ? self->trouble_code : code;
+    } else {
+        self->is_error_read = true;
+        cia402_setup_begin(self, CIA402_JOB_ERROR, (cia402_mode_t)self->setup.mode, drive.now_us);
+    }
+}
+
 void cia402_start_starting(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
@@ -190,6 +215,12 @@ void cia402_start_starting(cia402_drive_t drive)
                               (cia402_answer_every(drive.config) - 1u) * (uint64_t)drive.config->period_us;
     if (self->surplus >= CIA402_SURPLUS_MAX) {
         cia402_axis_reject(drive, CIA402_TWICE);
+        return;
+    }
+    if (self->setup.job != CIA402_JOB_NONE) { /* reads why it does not become operational */
+        if (cia402_setup_step(self, drive.config, drive.own, drive.now_us) != CIA402_SETUP_BUSY) {
+            reject_start(drive);
+        }
         return;
     }
     if (cia402_node_is_short(drive)) {
@@ -210,7 +241,8 @@ void cia402_start_starting(cia402_drive_t drive)
     }
     self->starts++;
     if (self->starts >= RESTARTS_MAX) {
-        cia402_axis_reject(drive, CIA402_NO_START);
+        self->is_error_read = false;
+        reject_start(drive);
     } else { /* once more from the beginning */
         self->is_reset_done = false;
         cia402_axis_look_for(drive);

@@ -16,10 +16,11 @@ static bool has(const cia402_axis_t *axis, uint16_t bit)
     return (axis->statusword & bit) != 0;
 }
 
-/* A change of mode is asked for without torque only. */
+/* A change of mode is asked for without torque only. A drive that shows none without torque may need a moment. */
 static bool is_out_of_mode(const cia402_axis_t *axis)
 {
-    return is_enabled(axis) && axis->setup.job == CIA402_JOB_NONE && axis->mode_shown != (int8_t)axis->setup.mode;
+    const bool is_hidden = axis->hides_mode && axis->mode_shown == 0 && !axis->has_shown_mode;
+    return is_enabled(axis) && axis->setup.job == CIA402_JOB_NONE && axis->mode_shown != (int8_t)axis->setup.mode && !is_hidden;
 }
 
 /* Some drives never show bit 12 in CSP: counts where it was there. In PP it means something else. */
@@ -68,6 +69,7 @@ void cia402_watch_restart(cia402_axis_t *self)
 {
     self->has_followed = false;
     self->had_voltage = false;
+    self->has_shown_mode = false;
     self->notes = 0;
     for (unsigned i = 0; i < CIA402_WATCHES; i++) {
         self->watch_answers[i] = 0;
@@ -77,8 +79,9 @@ void cia402_watch_restart(cia402_axis_t *self)
 static void learn(cia402_axis_t *self)
 {
     const bool is_up = is_enabled(self);
-    self->has_followed =
-        is_up && (self->has_followed || (self->mode_shown == (int8_t)self->setup.mode && has(self, CIA402_STATUS_BIT12)));
+    const bool is_in_mode = self->mode_shown == (int8_t)self->setup.mode;
+    self->has_shown_mode = is_up && (self->has_shown_mode || is_in_mode);
+    self->has_followed = is_up && (self->has_followed || (is_in_mode && has(self, CIA402_STATUS_BIT12)));
     self->had_voltage = is_up && (self->had_voltage || has(self, CIA402_STATUS_VOLTAGE));
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * sdo.c - SDO client for one node; see sdo.h.
- * A segment with the toggle of the one before is a frame that the bus repeated, so it is dropped; a server that really has its
- * toggle wrong ends in a time-out.
+ * A segment with the toggle of the one before is a frame that the bus repeated, so it is dropped. If nothing better follows, the
+ * server has its toggle wrong, and the transfer ends with the abort code for that. Some servers send only the bytes in use.
  */
 #include "heave/sdo.h"
 
@@ -9,8 +9,12 @@
 #define SEGMENT_MAX     7u
 #define REQUEST_ID      0x600u
 #define COMMAND_ABORT   0x80u
+#define ABORT_TOGGLE    0x05030000u
 #define ABORT_TIMEOUT   0x05040000u
+#define ABORT_COMMAND   0x05040001u
+#define ABORT_LENGTH    0x06070010u
 #define ABORT_TOO_LONG  0x06070012u
+#define ABORT_GENERAL   0x08000000u
 #define TOGGLE          0x10u
 #define BYTES_OF_HEADER 4u
 
@@ -81,6 +85,7 @@ static void compose_read_segment(sdo_t *self)
     }
     self->request[0] = (uint8_t)(REQUEST_READ_SEGMENT | toggle_bit(self));
     self->has_request = true;
+    self->odd_code = 0; /* it was the bus */
 }
 
 static void compose_write_segment(sdo_t *self)
@@ -94,11 +99,13 @@ static void compose_write_segment(sdo_t *self)
     }
     self->at = (uint8_t)(self->at + now);
     self->has_request = true;
+    self->odd_code = 0;
 }
 
 static void compose_initiate(sdo_t *self)
 {
     self->await = SDO_AWAIT_INITIATE;
+    self->is_quiet = false;
     self->is_toggled = false;
     self->at = 0;
     if (self->is_read) {
@@ -113,6 +120,7 @@ static void begin(sdo_t *self, uint16_t index, uint8_t sub, bool is_read, uint8_
     HV_ASSERT(tries > 0);
     self->state = SDO_BUSY;
     self->abort_code = 0;
+    self->odd_code = 0;
     self->index = index;
     self->sub = sub;
     self->is_read = is_read;
@@ -167,24 +175,40 @@ static bool is_about_object(const sdo_t *self, const uint8_t *data)
     return data[1] == (uint8_t)self->index && data[2] == (uint8_t)(self->index >> 8) && data[3] == self->sub;
 }
 
-static void receive_expedited(sdo_t *self, const uint8_t *data)
+/* An answer that cannot be used, and what is wrong with it. */
+static void note_odd(sdo_t *self, uint32_t code)
 {
-    const bool has_size = (data[0] & 1u) != 0;
-    self->size = (uint8_t)(has_size ? EXPEDITED_MAX - (data[0] >> 2 & 3u) : EXPEDITED_MAX);
-    for (unsigned i = 0; i < self->size; i++) {
-        self->value[i] = data[BYTES_OF_HEADER + i];
+    self->odd_code = code;
+}
+
+/* Where the server does not say how many bytes there are, it is as many as it has sent, up to four. */
+static void receive_expedited(sdo_t *self, const can_frame_t *frame)
+{
+    const uint8_t command = frame->data[0];
+    const unsigned sent = frame->length - BYTES_OF_HEADER;
+    const unsigned size = (command & 1u) != 0 ? EXPEDITED_MAX - (command >> 2 & 3u) : sent;
+    if (size > sent || size == 0) {
+        note_odd(self, ABORT_LENGTH);
+        return;
     }
+    for (unsigned i = 0; i < size; i++) {
+        self->value[i] = frame->data[BYTES_OF_HEADER + i];
+    }
+    self->size = (uint8_t)size;
     self->state = SDO_DONE;
 }
 
-static void receive_read_initiate(sdo_t *self, const uint8_t *data)
+/* A late answer counts if it has all that was asked for. */
+static void receive_read_initiate(sdo_t *self, const can_frame_t *frame)
 {
+    const uint8_t *data = frame->data;
     if ((data[0] & SPECIFIER) != ANSWER_READ) {
+        note_odd(self, ABORT_COMMAND);
+    } else if ((data[0] & 2u) != 0) {
+        receive_expedited(self, frame);
+    } else if (self->is_quiet) {
         return;
-    }
-    if ((data[0] & 2u) != 0) {
-        receive_expedited(self, data);
-    } else if ((data[0] & 1u) != 0 && u32_of(&data[4]) > SDO_BYTES_MAX) {
+    } else if ((data[0] & 1u) != 0 && frame->length == 8u && u32_of(&data[4]) > SDO_BYTES_MAX) {
         reject(self, ABORT_TOO_LONG);
     } else {
         self->await = SDO_AWAIT_SEGMENT;
@@ -192,23 +216,27 @@ static void receive_read_initiate(sdo_t *self, const uint8_t *data)
     }
 }
 
-static void receive_write_initiate(sdo_t *self, const uint8_t *data)
+static void receive_write_initiate(sdo_t *self, const can_frame_t *frame)
 {
-    if ((data[0] & SPECIFIER) != ANSWER_WRITE) {
-        return;
-    }
-    if (self->size <= EXPEDITED_MAX) {
+    if ((frame->data[0] & SPECIFIER) != ANSWER_WRITE) {
+        note_odd(self, ABORT_COMMAND);
+    } else if (self->size <= EXPEDITED_MAX) {
         self->state = SDO_DONE;
-    } else {
+    } else if (!self->is_quiet) {
         self->await = SDO_AWAIT_SEGMENT;
         compose_write_segment(self);
     }
 }
 
-static void receive_read_segment(sdo_t *self, const uint8_t *data)
+static void receive_read_segment(sdo_t *self, const can_frame_t *frame)
 {
+    const uint8_t *data = frame->data;
     const unsigned bytes = SEGMENT_MAX - (data[0] >> 1 & 7u);
     //@ split bytes;
+    if (bytes >= frame->length) {
+        note_odd(self, ABORT_LENGTH);
+        return;
+    }
     if (self->at + bytes > SDO_BYTES_MAX) {
         reject(self, ABORT_TOO_LONG);
         return;
@@ -236,41 +264,49 @@ static void receive_write_segment(sdo_t *self)
     }
 }
 
-static void receive_segment(sdo_t *self, const uint8_t *data)
+static void receive_segment(sdo_t *self, const can_frame_t *frame)
 {
     const unsigned expected = self->is_read ? ANSWER_READ_SEGMENT : ANSWER_WRITE_SEGMENT;
-    if ((data[0] & SPECIFIER) != expected || (data[0] & TOGGLE) != toggle_bit(self)) {
-        return; /* late, or repeated */
+    if ((frame->data[0] & SPECIFIER) != expected) {
+        return; /* late */
     }
-    if (self->is_read) {
-        receive_read_segment(self, data);
+    if ((frame->data[0] & TOGGLE) != toggle_bit(self)) {
+        note_odd(self, ABORT_TOGGLE);
+    } else if (self->is_read) {
+        receive_read_segment(self, frame);
     } else {
         receive_write_segment(self);
     }
 }
 
 /* In segments an abort may name any object. */
-static void receive_abort(sdo_t *self, const uint8_t *data)
+static void receive_abort(sdo_t *self, const can_frame_t *frame)
 {
-    if (self->await == SDO_AWAIT_SEGMENT || is_about_object(self, data)) {
-        fail(self, u32_of(&data[4]));
+    if (self->await == SDO_AWAIT_SEGMENT || is_about_object(self, frame->data)) {
+        fail(self, frame->length == 8u ? u32_of(&frame->data[4]) : ABORT_GENERAL);
     }
+}
+
+static bool is_usable(const sdo_t *self, const can_frame_t *frame)
+{
+    const unsigned least = self->await == SDO_AWAIT_SEGMENT && frame->data[0] != COMMAND_ABORT ? 1u : BYTES_OF_HEADER;
+    return !frame->is_rtr && frame->length >= least && frame->length <= 8u;
 }
 
 void sdo_receive(sdo_t *self, const can_frame_t *frame)
 {
-    const uint8_t *data = frame->data;
-    if (self->state != SDO_BUSY || self->has_request || frame->is_rtr || frame->length != 8 || self->await == SDO_AWAIT_QUIET) {
+    const bool is_too_late = self->is_quiet && self->await == SDO_AWAIT_SEGMENT;
+    if (self->state != SDO_BUSY || self->has_request || is_too_late || !is_usable(self, frame)) {
         return;
     }
-    if (data[0] == COMMAND_ABORT) {
-        receive_abort(self, data);
+    if (frame->data[0] == COMMAND_ABORT) {
+        receive_abort(self, frame);
     } else if (self->await == SDO_AWAIT_SEGMENT) {
-        receive_segment(self, data);
-    } else if (is_about_object(self, data) && self->is_read) {
-        receive_read_initiate(self, data);
-    } else if (is_about_object(self, data)) {
-        receive_write_initiate(self, data);
+        receive_segment(self, frame);
+    } else if (is_about_object(self, frame->data) && self->is_read) {
+        receive_read_initiate(self, frame);
+    } else if (is_about_object(self, frame->data)) {
+        receive_write_initiate(self, frame);
     }
 }
 
@@ -279,12 +315,14 @@ void sdo_receive(sdo_t *self, const can_frame_t *frame)
 /* No answer: the server is told, left alone for a while, and asked again. */
 static void retry_or_abort(sdo_t *self)
 {
-    if (self->await != SDO_AWAIT_QUIET) {
-        self->await = SDO_AWAIT_QUIET;
+    if (!self->is_quiet) {
+        self->is_quiet = true;
         compose_abort(self, ABORT_TIMEOUT);
     } else if (self->tries_left > 0) {
         self->tries_left--;
         compose_initiate(self);
+    } else if (self->odd_code != 0) {
+        fail(self, self->odd_code);
     } else {
         self->state = SDO_SILENT;
     }

@@ -275,6 +275,7 @@ typedef struct {
     bool is_sync_watched;
     bool is_reset_wanted;
     bool is_support_checked;
+    uint16_t csp_control_bits;
     uint8_t answer_every;
     bool has_torque_report;
     bool has_lag;

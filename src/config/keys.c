@@ -439,6 +439,8 @@ const config_key_t config_keys[] = {
      .help = "whether drives that have 6502h or 60E3h, and there not the mode or the homing method, are refused; no for drives whose lists are wrong"},
     {KEY("cia402", "allow_no_watchdog"), AT(cia402.is_no_watchdog_allowed), .type = &config_type_yes_no, .unit = "", .fallback = "no",
      .help = "takes drives that would not stop by themselves: without 1016h, 1017h, 6007h, 605Ah, 605Eh or 6065h, or with these off"},
+    {KEY("cia402", "csp_control_bits"), AT(cia402.csp_control_bits), .type = &config_type_mask, .unit = "", .fallback = "0", RANGE(0, 0x70),
+     .help = "bits 4 to 6 of 6040h that a drive needs to follow set-points in mode = csp: 70 sets all three; most need none"},
     {KEY("cia402", "vendor_id"), AT(cia402.vendor_id), .type = &config_type_integer, .unit = "", .fallback = "0",
      RANGE(0, 4294967295), .help = "1018h:1 that every drive must have; 0 = any"},
     {KEY("cia402", "product_code"), AT(cia402.product_code), .type = &config_type_integer, .unit = "", .fallback = "0",

@@ -222,6 +222,11 @@ static void check_times(config_source_t *self)
         config_source_key_error(self, SECTION, "answer_every",
                                 "mode = pp needs the answer to every SYNC; allowed: 1, or another mode");
     }
+    if ((cia402->csp_control_bits & ~CIA402_CSP_CONTROL_BITS) != 0) {
+        config_source_key_error(
+            self, SECTION, "csp_control_bits",
+            "the other bits of 6040h lead the drive through its states; allowed: 0, 10, 20, 40 and their sums");
+    }
     if (cia402->sync_counter == 1) {
         config_source_key_error(self, SECTION, "sync_counter", "a counter cannot end at 1; allowed: 0, or 2 to 240");
     }

@@ -169,6 +169,7 @@ void config_cia402(const config_t *config, cia402_config_t *out)
         .abort_option = (int16_t)((int)cia402->when_gateway_lost + 1),
         .sync_counter = cia402->sync_counter,
         .answer_every = cia402->answer_every,
+        .csp_control_bits = (uint8_t)cia402->csp_control_bits,
         .telemetry = config_telemetry(config),
         .telemetry_every = cia402->telemetry_every,
         .is_sync_watched = cia402->is_sync_watched,

@@ -27,6 +27,9 @@
 #define HOME_NEAR  100.0
 #define ODD_MAX    8u
 #define WORD_RESET 0x80u
+#define CSP_BITS   0x70u
+
+#define SLOW_RESET_US 100000u
 
 typedef enum { COMMAND_NONE, COMMAND_NO_VOLTAGE, COMMAND_STOP, COMMAND_SHUTDOWN, COMMAND_SWITCH_ON, COMMAND_ENABLE } command_t;
 
@@ -78,10 +81,11 @@ static uint16_t mode_bits(const drive_t *self)
     case MODE_PP:
         return (uint16_t)((self->is_pp_taken ? 0x1000 : 0) | (motor_is_there(&self->motor) ? 0x0400 : 0));
     case MODE_HOMING:
-        return self->homing == HOMING_RUNNING  ? 0
-               : self->homing == HOMING_DONE   ? 0x1400
-               : self->homing == HOMING_FAILED ? 0x2000
-                                               : 0x0400;
+        return (uint16_t)((self->homing == HOMING_RUNNING  ? 0u
+                           : self->homing == HOMING_DONE   ? 0x1400u
+                           : self->homing == HOMING_FAILED ? 0x2000u
+                                                           : 0x0400u) &
+                          (quirk_is(self->quirks, QUIRK_NO_BIT_10) ? ~0x0400u : ~0u));
     default:
         return 0;
     }
@@ -98,11 +102,12 @@ static uint32_t inputs(const drive_t *self)
 
 static void show(drive_t *self)
 {
+    const bool is_mode_hidden = quirk_is(self->quirks, QUIRK_HIDES_MODE) && !drive_is_enabled(self);
     const unsigned powered = has_power(self->state) ? 0x10u : 0u;
     const unsigned warning = self->motor.temperature_c > WARNING_C ? 0x80u : 0u;
     const unsigned word = (unsigned)self->state | powered | warning | 0x0200u | mode_bits(self) | self->bits_set;
     objects_put(&self->od, 0x6041, 0, word & 0xFFFFu & ~(unsigned)self->bits_clear);
-    objects_put(&self->od, 0x6061, 0, (uint8_t)self->mode);
+    objects_put(&self->od, 0x6061, 0, is_mode_hidden ? 0 : (uint8_t)self->mode);
     objects_put(&self->od, 0x6064, 0, (uint32_t)drive_count(self));
     objects_put(&self->od, 0x6062, 0, (uint32_t)(int32_t)llround(self->motor.demand - self->origin));
     objects_put(&self->od, 0x606C, 0, (uint32_t)(int32_t)lround(self->motor.speed * 1e6));
@@ -302,6 +307,15 @@ static void operate(drive_t *self, bool start)
     self->has_start = start;
 }
 
+static void reset_fault(drive_t *self)
+{
+    self->reset_due_us = DRIVE_NEVER;
+    enter(self, TWIN_DISABLED);
+    objects_put(&self->od, 0x1001, 0, 0);
+    objects_put(&self->od, 0x603F, 0, 0);
+    self->is_emergency_over = true;
+}
+
 void drive_control(drive_t *self, uint16_t word)
 {
     const unsigned rising = word & ~(unsigned)self->word;
@@ -309,12 +323,10 @@ void drive_control(drive_t *self, uint16_t word)
         return;
     }
     self->word = word;
+    self->reset_due_us = (word & WORD_RESET) != 0 ? self->reset_due_us : DRIVE_NEVER;
     if (self->state == TWIN_FAULT) {
         if ((rising & WORD_RESET) != 0 && !self->is_broken) {
-            enter(self, TWIN_DISABLED);
-            objects_put(&self->od, 0x1001, 0, 0);
-            objects_put(&self->od, 0x603F, 0, 0);
-            self->is_emergency_over = true;
+            self->reset_due_us = self->now_us + (quirk_is(self->quirks, QUIRK_SLOW_RESET) ? SLOW_RESET_US : 0u);
         }
         return;
     }
@@ -372,7 +384,9 @@ static void miss(drive_t *self)
 static void follow(drive_t *self)
 {
     const bool is_cyclic = self->mode == MODE_CSP || (self->mode == MODE_IP && self->is_ip_active);
-    if (!drive_is_enabled(self) || self->is_deaf || !is_cyclic) {
+    const bool is_blind =
+        self->mode == MODE_CSP && quirk_is(self->quirks, QUIRK_NEEDS_BITS) && (self->word & CSP_BITS) != CSP_BITS;
+    if (!drive_is_enabled(self) || self->is_deaf || !is_cyclic || is_blind) {
         return;
     }
     if (!self->has_set_point) {
@@ -435,6 +449,9 @@ static void change(drive_t *self)
     if (self->now_us >= self->state_due_us && !self->is_deaf) {
         enter(self, self->next_state);
     }
+    if (self->now_us >= self->reset_due_us) {
+        reset_fault(self);
+    }
     if (self->now_us >= self->mode_due_us) {
         self->mode_due_us = DRIVE_NEVER;
         self->mode = self->next_mode;
@@ -459,13 +476,14 @@ uint64_t drive_due_us(const drive_t *self)
     const uint64_t state_us = self->is_deaf ? DRIVE_NEVER : self->state_due_us;
     uint64_t due_us = state_us < self->stop_due_us ? state_us : self->stop_due_us;
     due_us = self->mode_due_us < due_us ? self->mode_due_us : due_us;
+    due_us = self->reset_due_us < due_us ? self->reset_due_us : due_us;
     return due_us;
 }
 
 void drive_start(drive_t *self, uint64_t now_us)
 {
     self->now_us = now_us;
-    self->mode_due_us = self->stop_due_us = self->lag_since_us = DRIVE_NEVER;
+    self->mode_due_us = self->stop_due_us = self->reset_due_us = self->lag_since_us = DRIVE_NEVER;
     self->mode = self->next_mode = 0;
     self->word = 0;
     self->emergency = 0;

@@ -7,6 +7,7 @@
 
 #include "twin/motor.h"
 #include "twin/objects.h"
+#include "twin/quirks.h"
 
 /** Bits 0 to 3, 5 and 6 of the statusword. */
 typedef enum {
@@ -37,6 +38,7 @@ typedef struct {
     bool is_deaf;          /**< answers, but acts on nothing */
     bool is_broken;        /**< the cause of its fault stays */
     bool is_homing_broken; /**< homing ends with an error */
+    uint32_t quirks;       /**< quirk_t */
     uint16_t bits_set;     /**< of the statusword, whatever it does */
     uint16_t bits_clear;
 
@@ -49,6 +51,7 @@ typedef struct {
     uint64_t stop_due_us;
     twin_state_t stop_state; /**< entered when the stop is over */
     uint64_t mode_due_us;
+    uint64_t reset_due_us; /**< of a drive that takes long for it */
     int8_t mode, next_mode;
     uint16_t word;
     bool is_ip_active, is_pp_taken, has_set_point, has_start;

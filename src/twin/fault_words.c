@@ -72,6 +72,21 @@ bool fault_read_object(const char *word, uint32_t *out, char why[FAULT_WHY_MAX])
     return true;
 }
 
+bool fault_read_quirk(const char *word, double *out, char why[FAULT_WHY_MAX])
+{
+    const char *name = NULL;
+    quirk_t bit = QUIRK_HIDES_MODE;
+    int used = snprintf(why, FAULT_WHY_MAX, "there is no quirk %s; there are", word);
+    for (unsigned i = 0; quirk_describe(i, &name, &bit); i++) {
+        if (strcmp(word, name) == 0) {
+            *out = (double)bit;
+            return true;
+        }
+        used += snprintf(why + used, FAULT_WHY_MAX - (size_t)used, "%s %s", i == 0 ? "" : ",", name);
+    }
+    return false;
+}
+
 bool fault_read_number(const char *word, double most, double *out, char why[FAULT_WHY_MAX])
 {
     char *end = NULL;

@@ -17,6 +17,9 @@ bool fault_read_drives(const char *word, unsigned drives, uint32_t *out, char wh
 /** `6065` or `1016:1`, of an object that these drives have. */
 bool fault_read_object(const char *word, uint32_t *out, char why[FAULT_WHY_MAX]);
 
+/** A name of quirks.h; its bit. */
+bool fault_read_quirk(const char *word, double *out, char why[FAULT_WHY_MAX]);
+
 /** From 0 to most, decimal or as 0x10. */
 bool fault_read_number(const char *word, double most, double *out, char why[FAULT_WHY_MAX]);
 

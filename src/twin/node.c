@@ -14,7 +14,6 @@
 #define SYNC_LATE      0x8100u
 #define SYNC_LENGTH    0x8240u
 
-#define BAD_COMMAND 0x05040001u
 #define RESET_SHARE 4u   /* a reset of the communication takes so much less than a boot */
 #define LOOK_US     1000 /* an axis with power is looked at so often */
 
@@ -99,7 +98,7 @@ static bool has_number(const cia402_maps_t *maps, unsigned number)
 
 /* The drive has as many PDOs as others. Those whose numbers are higher take the places of its last ones that are not in use.
  * Returns the place of a PDO, from 1; 0: the drive has no such PDO. */
-static unsigned place_of(const cia402_maps_t *maps, unsigned number)
+unsigned node_pdo_place(const cia402_maps_t *maps, unsigned number)
 {
     unsigned place = OBJECT_PDOS;
     for (unsigned i = 0; i < maps->count; i++) {
@@ -121,7 +120,7 @@ static void put_maps(node_t *self, uint16_t mappings, const cia402_maps_t *maps)
 {
     for (unsigned i = 0; i < maps->count; i++) {
         const cia402_map_t *map = &maps->map[i];
-        objects_map(&self->drive.od, (uint16_t)(mappings + place_of(maps, map->number) - 1), map->entry, map->entries,
+        objects_map(&self->drive.od, (uint16_t)(mappings + node_pdo_place(maps, map->number) - 1), map->entry, map->entries,
                     self->are_maps_fixed);
     }
 }
@@ -203,6 +202,9 @@ static void reset(node_t *self, bool is_all)
 /* With SYNC supervised, it becomes operational only while SYNC is there. */
 static bool may_start(const node_t *self)
 {
+    if (quirk_is(self->drive.quirks, QUIRK_FAULT_BLOCKS) && self->drive.state == TWIN_FAULT) {
+        return false;
+    }
     return objects_get(&self->drive.od, 0x1006, 0) == 0 || self->sync_due_us != DRIVE_NEVER;
 }
 
@@ -314,98 +316,6 @@ static void sync_late(node_t *self)
     }
 }
 
-/* --- SDO: expedited but for texts --- */
-
-static void answer(node_t *self, uint8_t command, const uint8_t *request, uint32_t value)
-{
-    const uint8_t data[8] = {command,
-                             request[1],
-                             request[2],
-                             request[3],
-                             (uint8_t)value,
-                             (uint8_t)(value >> 8),
-                             (uint8_t)(value >> 16),
-                             (uint8_t)(value >> 24)};
-    node_put_later(self, self->sdo_us, 0x580u + self->number, data, 8);
-}
-
-/* What a write means beyond its value. Returns an abort code. */
-static uint32_t written(node_t *self, uint16_t index, uint32_t value)
-{
-    switch (index) {
-    case 0x100C:
-    case 0x100D:
-    case 0x1016:
-        self->master_due_us = DRIVE_NEVER;
-        return 0;
-    case 0x1017:
-        self->beat_due_us = value == 0 ? DRIVE_NEVER : self->now_us + value * 1000u;
-        return 0;
-    case 0x6040:
-        drive_control(&self->drive, (uint16_t)value);
-        return 0;
-    case 0x6060:
-        return drive_choose_mode(&self->drive, (int8_t)value);
-    default:
-        return 0;
-    }
-}
-
-static void accept_write(node_t *self, node_t *owner, const uint8_t *request, uint16_t index)
-{
-    const uint8_t bytes = (request[0] & 1) != 0 ? (uint8_t)(4 - (request[0] >> 2 & 3)) : 4;
-    uint32_t value = 0;
-    for (unsigned i = 0; i < bytes; i++) {
-        value |= (uint32_t)request[4 + i] << (8 * i);
-    }
-    uint32_t refusal = objects_write(&owner->drive.od, index, request[3], value, bytes, self->nmt == NODE_OPERATIONAL);
-    refusal = refusal != 0 ? refusal : written(owner, index, value);
-    answer(self, refusal != 0 ? 0x80 : 0x60, request, refusal);
-}
-
-/* The axis that has an object, which it knows as the first one would. */
-static node_t *owner_of(node_t *self, uint16_t *index)
-{
-    const unsigned record = *index & 0x1FFu;
-    const unsigned step = self->pdo_step != 0 ? self->pdo_step : 64u;
-    const bool is_pdo = *index >= 0x1400 && *index < 0x1C00;
-    const unsigned channel = is_pdo ? record / step : *index >= 0x6000 ? (*index - 0x6000u) / 0x800u : 0;
-    const unsigned axis = channel < OBJECT_AXES && self->axis[channel] != NULL ? channel : 0;
-    node_t *owner = axis == 0 ? self : self->axis[axis];
-    *index = (uint16_t)(*index - (is_pdo ? axis * step : axis * 0x800u));
-    if (is_pdo) {
-        const unsigned number = (*index & 0x1FFu) + 1u;
-        const unsigned place = place_of(*index < 0x1800 ? &owner->commands : &owner->answers, number);
-        *index = (uint16_t)(place == 0 ? 0 : *index - number + place);
-    }
-    return owner;
-}
-
-static void hear_sdo(node_t *self, const can_frame_t *frame)
-{
-    const uint8_t *request = frame->data;
-    uint16_t index = (uint16_t)(request[1] | request[2] << 8);
-    node_t *owner = owner_of(self, &index);
-    const object_t *row = objects_find(&owner->drive.od, index, request[3]);
-    const uint32_t refusal = objects_read_refusal(&owner->drive.od, index, request[3]);
-    if (self->nmt == STOPPED || frame->length != 8 || self->is_sdo_silent || request[0] == 0x80 ||
-        (row != NULL && row->is_silent)) {
-        return;
-    }
-    uint8_t text[8];
-    if ((refusal == 0 || (request[0] & 0xE0) == 0x60) && node_text_hear(&self->text, request, text)) {
-        node_put_later(self, self->sdo_us, 0x580u + self->number, text, 8);
-    } else if ((request[0] & 0xE2) == 0x22) {
-        accept_write(self, owner, request, index);
-    } else if ((request[0] & 0xE0) != 0x40) {
-        answer(self, 0x80, request, BAD_COMMAND);
-    } else if (refusal != 0 || row == NULL) {
-        answer(self, 0x80, request, refusal);
-    } else {
-        answer(self, (uint8_t)(0x43 | (4 - row->bytes) << 2), request, row->value);
-    }
-}
-
 /* --- Life --- */
 
 static void hear_data(node_t *self, const can_frame_t *frame)
@@ -416,7 +326,7 @@ static void hear_data(node_t *self, const can_frame_t *frame)
     } else if (is_first && frame->id == (objects_get(&self->drive.od, 0x1005, 0) & CAN_ID_MAX)) {
         hear_sync(self, frame);
     } else if (is_first && frame->id == 0x600u + self->number) {
-        hear_sdo(self, frame);
+        node_hear_sdo(self, frame);
     } else if (is_first && (frame->id & 0x780u) == 0x700u) {
         hear_heartbeat(self, frame->id & 0x7F);
     } else if (!is_first || self->nmt == NODE_OPERATIONAL) {
@@ -454,7 +364,9 @@ void node_advance(node_t *self, uint64_t now_us)
     if (now_us >= self->boot_due_us) {
         const uint8_t nothing = 0;
         self->boot_due_us = DRIVE_NEVER;
-        node_put(self, 0x700u + self->number, &nothing, 1);
+        for (unsigned i = 0; i < (quirk_is(self->drive.quirks, QUIRK_BOOTS_TWICE) ? 2u : 1u); i++) {
+            node_put(self, 0x700u + self->number, &nothing, 1);
+        }
         node_enter(self, PRE_OPERATIONAL);
     }
     if (now_us >= self->beat_due_us) {

@@ -59,6 +59,7 @@ typedef struct node {
     bool is_counting[OBJECT_PDOS]; /**< TPDO N has met its SYNC start value, or needs none */
     uint8_t event_data[OBJECT_PDOS][8];
     uint64_t event_us[OBJECT_PDOS]; /**< when TPDO N told of a change last; 0 = never */
+    uint16_t shown_word;            /**< statusword that it has told of by itself */
     uint32_t waits;
     node_text_t text;
     node_waiting_t waiting[NODE_WAITING_MAX];

@@ -20,6 +20,12 @@ void node_put_due(node_t *self);
 /** SYNC for the PDOs of one axis: its TPDOs, then what it has received. */
 void node_sync_pdos(node_t *self, const can_frame_t *sync, uint64_t now_us);
 
+/** A request to its SDO server. */
+void node_hear_sdo(node_t *self, const can_frame_t *frame);
+
+/** The place of a PDO, from 1; 0: the drive has no such PDO. */
+unsigned node_pdo_place(const cia402_maps_t *maps, unsigned number);
+
 /** A frame that may be one of its RPDOs. */
 void node_hear_pdo(node_t *self, const can_frame_t *frame);
 

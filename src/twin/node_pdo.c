@@ -34,7 +34,10 @@ static void put_tpdo(node_t *self, uint16_t n)
         self->tpdo_drop--;
         return;
     }
-    node_put_later(self, self->tpdo_us, objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 1) & CAN_ID_MAX, data, length);
+    const uint8_t sent = quirk_is(self->drive.quirks, QUIRK_LONG_PDO)    ? 8u
+                         : quirk_is(self->drive.quirks, QUIRK_SHORT_PDO) ? (uint8_t)(length - 1u)
+                                                                         : length;
+    node_put_later(self, self->tpdo_us, objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 1) & CAN_ID_MAX, data, sent);
 }
 
 /* 1800h:06: the first SYNC that counts is the one with that number; it is answered. */
@@ -83,8 +86,24 @@ uint64_t node_event_due_us(const node_t *self, uint16_t n)
     return self->event_us[n] == 0 ? self->now_us : timer_ms == 0 ? DRIVE_NEVER : self->event_us[n] + timer_ms * 1000u;
 }
 
+/* Of synchronous TPDOs, beside those that SYNC is answered with. */
+static void put_changes(node_t *self)
+{
+    const uint16_t word = (uint16_t)objects_get(&self->drive.od, 0x6041, 0);
+    const bool is_change = self->nmt == NODE_OPERATIONAL && word != self->shown_word;
+    self->shown_word = word;
+    for (uint16_t n = 0; n < OBJECT_PDOS && is_change; n++) {
+        if (objects_is_pdo(&self->drive.od, (uint16_t)(0x1800 + n)) && !is_event_pdo(self, n)) {
+            put_tpdo(self, n);
+        }
+    }
+}
+
 void node_put_events(node_t *self)
 {
+    if (quirk_is(self->drive.quirks, QUIRK_SENDS_CHANGES)) {
+        put_changes(self);
+    }
     for (uint16_t n = 0; n < OBJECT_PDOS && self->nmt == NODE_OPERATIONAL; n++) {
         uint8_t data[8] = {0};
         if (!is_event_pdo(self, n) || self->now_us < self->event_us[n] + EVENT_US) {

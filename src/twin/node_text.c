@@ -27,23 +27,25 @@ static const char *find(uint16_t index, uint8_t sub)
     return NULL;
 }
 
-static void begin(node_text_t *self, const char *text, const uint8_t request[8], uint8_t data[8])
+static void begin(node_text_t *self, const uint8_t *from, size_t size, const uint8_t request[8], uint8_t data[8])
 {
-    *self = (node_text_t){.text = text};
+    self->at = from;
+    self->left = size;
+    self->is_toggled = false;
     memcpy(data, request, 4);
     data[0] = 0x41;
-    data[4] = (uint8_t)strlen(text);
+    data[4] = (uint8_t)size;
 }
 
 static void go_on(node_text_t *self, uint8_t data[8])
 {
-    const size_t left = strlen(self->text);
-    const size_t now = left < SEGMENT_MAX ? left : SEGMENT_MAX;
-    const bool is_last = now == left;
-    data[0] = (uint8_t)((self->is_toggled ? TOGGLE : 0u) | (SEGMENT_MAX - now) << 1 | (is_last ? 1u : 0u));
-    memcpy(&data[1], self->text, now);
+    const size_t now = self->left < SEGMENT_MAX ? self->left : SEGMENT_MAX;
+    const bool is_last = now == self->left;
+    data[0] = (uint8_t)((self->is_toggled != self->is_inverted ? TOGGLE : 0u) | (SEGMENT_MAX - now) << 1 | (is_last ? 1u : 0u));
+    memcpy(&data[1], self->at, now);
     self->is_toggled = !self->is_toggled;
-    self->text = is_last ? NULL : self->text + now;
+    self->at = is_last ? NULL : self->at + now;
+    self->left -= now;
 }
 
 bool node_text_hear(node_text_t *self, const uint8_t request[8], uint8_t data[8])
@@ -52,14 +54,23 @@ bool node_text_hear(node_text_t *self, const uint8_t request[8], uint8_t data[8]
     const bool is_begin = (request[0] & SPECIFIER) == READ;
     const char *text = is_begin ? find(index, request[3]) : NULL;
     const bool is_next =
-        (request[0] & SPECIFIER) == READ_SEGMENT && self->text != NULL && ((request[0] & TOGGLE) != 0) == self->is_toggled;
+        (request[0] & SPECIFIER) == READ_SEGMENT && self->at != NULL && ((request[0] & TOGGLE) != 0) == self->is_toggled;
     memset(data, 0, 8);
     if (text != NULL) {
-        begin(self, text, request, data);
+        begin(self, (const uint8_t *)text, strlen(text), request, data);
     } else if (is_next) {
         go_on(self, data);
     } else {
-        self->text = NULL;
+        self->at = NULL;
     }
     return text != NULL || is_next;
+}
+
+void node_text_number(node_text_t *self, const uint8_t request[8], uint32_t value, uint8_t bytes, uint8_t data[8])
+{
+    for (unsigned i = 0; i < sizeof self->number; i++) {
+        self->number[i] = (uint8_t)(value >> (8u * i));
+    }
+    memset(data, 0, 8);
+    begin(self, self->number, bytes, request, data);
 }

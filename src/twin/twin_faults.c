@@ -19,7 +19,8 @@
 #define HOT_C        120.0
 #define REGISTER_SET 0x81u
 
-/** One name. form: d = drives, o = an object, n = a number, N = one that may be left out, s = a switch's state, g = a section. */
+/** One name. form: d = drives, o = an object, n = a number, N = one that may be left out, s = a switch's state, g = a section, q
+ * = a quirk. */
 typedef struct {
     const char *name;
     const char *form;
@@ -75,6 +76,7 @@ ACT(act_mend)
     node->tpdo_drop = node->tpdo_us = 0;
     head->sdo_us = 1000;
     node->drive.bits_set = node->drive.bits_clear = 0;
+    node->drive.quirks = head->drive.quirks = 0;
     for (uint32_t i = 0; i < node->drive.od.count; i++) {
         object_t *row = &node->drive.od.row[i];
         row->is_missing = row->is_silent = false;
@@ -221,6 +223,14 @@ ACT(act_object)
     row->is_read_only = true;
 }
 
+/* Of all axes of a drive. */
+ACT(act_quirk)
+{
+    const uint32_t quirk = (uint32_t)fault->number[0];
+    head_of(twin, k)->drive.quirks |= quirk;
+    node_of(twin, k)->drive.quirks |= quirk;
+}
+
 ACT(act_node)
 {
     node_t *node = head_of(twin, k);
@@ -299,6 +309,7 @@ static const row_t k_rows[] = {
     {"missing", "do", "DRIVE INDEX[:SUB]", "has not got that object", {0}, 0, act_sdo_missing, BUS_OFF},
     {"object", "don", "DRIVE INDEX[:SUB] VALUE", "that object holds this until mend or the next power-up, and takes nothing else", {0}, UINT32_MAX, act_object, BUS_OFF},
     {"node", "dn", "DRIVE NODE", "gets this node id, which another one may have, and starts again", {0}, 127, act_node, BUS_OFF},
+    {"quirk", "dq", "DRIVE NAME", "differs from the usual drives, as some do; docs/twin.md has the names", {0}, 0, act_quirk, BUS_OFF},
     {"hot", "d", "DRIVE", "the motor is too hot", {0}, 0, act_hot, BUS_OFF},
     {"slip", "dn", "DRIVE MM_S", "the brake does not hold: sinks so fast without torque", {0}, 1e4, act_slip, BUS_OFF},
     {"load", "dn", "DRIVE MM", "gives way so far under its load", {0}, 1e4, act_load, BUS_OFF},
@@ -358,6 +369,23 @@ static bool reject_form(const row_t *row, char why[FAULT_WHY_MAX])
     return false;
 }
 
+/* A word that is no drive. number: where it belongs if it is no object either. */
+static bool read_word(fault_t *self, const row_t *row, char form, const char *word, double *number, char why[FAULT_WHY_MAX])
+{
+    switch (form) {
+    case 'o':
+        return fault_read_object(word, &self->object, why);
+    case 's':
+        return line_fault_read_state(word, number, why);
+    case 'g':
+        return line_fault_read_section(word, number, why);
+    case 'q':
+        return fault_read_quirk(word, number, why);
+    default:
+        return fault_read_number(word, row->most, number, why);
+    }
+}
+
 static bool read_arguments(fault_t *self, const row_t *row, const char *at, unsigned drives, char why[FAULT_WHY_MAX])
 {
     char word[FAULT_WORD_MAX];
@@ -369,14 +397,11 @@ static bool read_arguments(fault_t *self, const row_t *row, const char *at, unsi
             }
             return reject_form(row, why);
         }
-        const bool is_read = *form == 'd'   ? fault_read_drives(word, drives, &self->drives, why)
-                             : *form == 's' ? line_fault_read_state(word, &self->number[numbers++], why)
-                             : *form == 'g' ? line_fault_read_section(word, &self->number[numbers++], why)
-                             : *form == 'o' ? fault_read_object(word, &self->object, why)
-                                            : fault_read_number(word, row->most, &self->number[numbers++], why);
-        if (!is_read) {
+        if (!(*form == 'd' ? fault_read_drives(word, drives, &self->drives, why)
+                           : read_word(self, row, *form, word, &self->number[numbers], why))) {
             return false;
         }
+        numbers += *form != 'd' && *form != 'o';
     }
     return at[strspn(at, " \t")] == '\0' || reject_form(row, why);
 }

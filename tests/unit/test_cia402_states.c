@@ -148,6 +148,7 @@ static void test_fault_is_blamed_on_a_second_drive_only_while_it_answers(void)
     axis->phase = CIA402_UP;
     for (unsigned i = 0; i < 1000; i++) {
         cia402_axis_note_answer(cia402_drive(&m_driver, 2), 0, 1);
+        cia402_axis_count_answer(cia402_drive(&m_driver, 2));
     }
     TEST_ASSERT_GREATER_THAN_UINT(0, axis->surplus);
     cia402_axis_fail(cia402_drive(&m_driver, 2), 0x8611);
@@ -155,6 +156,21 @@ static void test_fault_is_blamed_on_a_second_drive_only_while_it_answers(void)
     axis->plain_syncs = 2;
     cia402_axis_fail(cia402_drive(&m_driver, 2), 0x8611);
     TEST_ASSERT_EQUAL_HEX32(0x8611, axis->own_fault);
+}
+
+/* The order in which two drives answer changes, so that each of them confirms the other one. */
+static void test_second_drive_is_found_in_whatever_order_they_answer(void)
+{
+    cia402_axis_t *axis = &m_driver.axis[2];
+    axis->phase = CIA402_UP;
+    for (unsigned n = 0; n < 20 && axis->surplus < 2; n++) {
+        for (unsigned i = 0; i < 2; i++) {
+            axis->awaited = i == 0 ? 1 : 0;
+            axis->statusword = (n + i) % 2 == 0 ? 0x250 : 0x231;
+            cia402_axis_count_answer(cia402_drive(&m_driver, 2));
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT8(2, axis->surplus);
 }
 
 static void test_node_answers_where_each_of_its_axes_has(void)
@@ -243,6 +259,7 @@ int main(void)
     RUN_TEST(test_reset_wakes_nobody_where_nothing_may_be_sent);
     RUN_TEST(test_torque_that_is_lost_while_others_come_up_is_not_put_on_again);
     RUN_TEST(test_fault_is_blamed_on_a_second_drive_only_while_it_answers);
+    RUN_TEST(test_second_drive_is_found_in_whatever_order_they_answer);
     RUN_TEST(test_node_answers_where_each_of_its_axes_has);
     RUN_TEST(test_counts_are_unknown_before_the_first_position);
     RUN_TEST(test_objects_are_not_asked_for_before_the_first_poll_or_on_a_bus_that_is_gone);

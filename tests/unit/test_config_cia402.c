@@ -559,6 +559,8 @@ static void test_load_what_contradicts_itself_is_refused_at_its_line(void)
     refuse("period_us = 1000", "the bus would be loaded by");
     refuse("heartbeat_timeout_ms = 99", "allowed: at least 100 ms");
     refuse("sync_counter = 1", "allowed: 0, or 2 to 240");
+    refuse("csp_control_bits = 08", "allowed: 0, 10, 20, 40 and their sums");
+    refuse("csp_control_bits = 80", "hexadecimal 0 to 70");
     refuse("following_error_mm = 5.9", "at least 6.00");
 }
 

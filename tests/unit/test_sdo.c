@@ -137,7 +137,7 @@ static void test_receive_repeated_segment_is_dropped(void)
     TEST_ASSERT_EQUAL_MEMORY("ABCDEFGHIJ", sdo.value, 10);
 }
 
-static void test_receive_toggle_wrong_for_good_ends_in_silence(void)
+static void test_receive_toggle_wrong_for_good_is_named(void)
 {
     sdo_write(&sdo, 0x2000, 1, (const uint8_t *)"abcdefghij", 10, 1);
     expect("\x21\x00\x20\x01\x0A\0\0\0");
@@ -150,7 +150,75 @@ static void test_receive_toggle_wrong_for_good_ends_in_silence(void)
     expect("\x80\x00\x20\x01\x00\x00\x04\x05");
     wait();
     expect_nothing();
-    TEST_ASSERT_EQUAL(SDO_SILENT, sdo.state);
+    TEST_ASSERT_EQUAL(SDO_ABORTED, sdo.state);
+    TEST_ASSERT_EQUAL_HEX32(0x05030000, sdo.abort_code);
+}
+
+/* Some servers send the bytes in use only. */
+static void test_receive_short_answers_count_if_they_are_whole(void)
+{
+    static const struct {
+        can_frame_t frame;
+        uint8_t size;
+        uint32_t value;
+    } k_rows[] = {{{.length = 5, .data = {0x4F, 0x64, 0x60, 0, 7}}, 1, 7},
+                  {{.length = 6, .data = {0x4B, 0x64, 0x60, 0, 7, 8}}, 2, 0x807},
+                  {{.length = 6, .data = {0x42, 0x64, 0x60, 0, 7, 8}}, 2, 0x807},
+                  {{.length = 6, .data = {0x43, 0x64, 0x60, 0, 7, 8}}, 0, 0},
+                  {{.length = 4, .data = {0x4F, 0x64, 0x60, 0, 7}}, 0, 0},
+                  {{.length = 4, .data = {0x42, 0x64, 0x60, 0, 7}}, 0, 0},
+                  {{.length = 3, .data = {0x4F, 0x64, 0x60, 0, 7}}, 0, 0},
+                  {{.length = 12, .data = {0x4F, 0x64, 0x60, 0, 7}}, 0, 0}};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        sdo_read(&sdo, 0x6064, 0, 1);
+        expect("\x40\x64\x60\x00\0\0\0\0");
+        sdo_receive(&sdo, &k_rows[i].frame);
+        TEST_ASSERT_EQUAL(k_rows[i].size != 0 ? SDO_DONE : SDO_BUSY, sdo.state);
+        if (k_rows[i].size != 0) {
+            TEST_ASSERT_EQUAL_UINT8(k_rows[i].size, sdo.size);
+            TEST_ASSERT_EQUAL_HEX32(k_rows[i].value, sdo_value_u32(&sdo));
+        }
+    }
+    sdo_write(&sdo, 0x6060, 0, (const uint8_t *)"\x08", 1, 1);
+    expect("\x2F\x60\x60\x00\x08\0\0\0");
+    sdo_receive(&sdo, &(can_frame_t){.length = 4, .data = {0x60, 0x60, 0x60, 0}});
+    TEST_ASSERT_EQUAL(SDO_DONE, sdo.state);
+    sdo_read(&sdo, 0x6064, 0, 1);
+    expect("\x40\x64\x60\x00\0\0\0\0");
+    sdo_receive(&sdo, &(can_frame_t){.length = 4, .data = {0x80, 0x64, 0x60, 0}});
+    TEST_ASSERT_EQUAL(SDO_ABORTED, sdo.state);
+    TEST_ASSERT_EQUAL_HEX32(0x08000000, sdo.abort_code);
+    sdo_read(&sdo, 0x1008, 0, 1);
+    expect("\x40\x08\x10\x00\0\0\0\0");
+    sdo_receive(&sdo, &(can_frame_t){.length = 4, .data = {0x40, 0x08, 0x10, 0}}); /* segments, and no size */
+    expect("\x60\0\0\0\0\0\0\0");
+    sdo_receive(&sdo, &(can_frame_t){.length = 2, .data = {0x0B, 'A'}}); /* says that there are two */
+    TEST_ASSERT_EQUAL(SDO_BUSY, sdo.state);
+    sdo_receive(&sdo, &(can_frame_t){.length = 3, .data = {0x0B, 'A', 'B'}});
+    TEST_ASSERT_EQUAL(SDO_DONE, sdo.state);
+    TEST_ASSERT_EQUAL_MEMORY("AB", sdo.value, 2);
+}
+
+/* What cannot be used is said when nothing better has come; nothing at all is silence. */
+static void test_step_answers_that_cannot_be_used_are_named(void)
+{
+    static const struct {
+        can_frame_t frame;
+        uint32_t code;
+    } k_rows[] = {{{.length = 6, .data = {0x43, 0x64, 0x60, 0, 7, 8}}, 0x06070010},
+                  {{.length = 8, .data = {0x60, 0x64, 0x60, 0}}, 0x05040001},
+                  {{.length = 8, .data = {0x43, 0x65, 0x60, 0}}, 0}};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        sdo_read(&sdo, 0x6064, 0, 1);
+        expect("\x40\x64\x60\x00\0\0\0\0");
+        sdo_receive(&sdo, &k_rows[i].frame);
+        wait();
+        expect("\x80\x64\x60\x00\x00\x00\x04\x05");
+        wait();
+        expect_nothing();
+        TEST_ASSERT_EQUAL(k_rows[i].code != 0 ? SDO_ABORTED : SDO_SILENT, sdo.state);
+        TEST_ASSERT_EQUAL_HEX32(k_rows[i].code, sdo.abort_code);
+    }
 }
 
 static void test_read_more_than_there_is_room_for_is_refused(void)
@@ -256,14 +324,45 @@ static void test_step_no_answer_aborts_waits_and_tries_again(void)
         expect_nothing();
         now_us += 1;
         expect("\x80\x64\x60\x00\x00\x00\x04\x05");
-        answer("\x43\x64\x60\x00\x01\x02\x03\x04"); /* late: of the attempt that was given up */
-        TEST_ASSERT_EQUAL(SDO_BUSY, sdo.state);
         now_us += TIMEOUT_US - 1;
         expect_nothing();
         now_us += 1;
     }
     expect_nothing();
     TEST_ASSERT_EQUAL(SDO_SILENT, sdo.state);
+}
+
+/* Late, but what was asked for; of segments there would be more to ask. */
+static void test_receive_in_the_pause_whole_answers_count(void)
+{
+    sdo_read(&sdo, 0x6064, 0, 3);
+    expect("\x40\x64\x60\x00\0\0\0\0");
+    wait();
+    expect("\x80\x64\x60\x00\x00\x00\x04\x05");
+    answer("\x43\x64\x60\x00\x01\x02\x03\x04");
+    TEST_ASSERT_EQUAL(SDO_DONE, sdo.state);
+    sdo_write(&sdo, 0x6060, 0, (const uint8_t *)"\x08", 1, 3);
+    expect("\x2F\x60\x60\x00\x08\0\0\0");
+    wait();
+    expect("\x80\x60\x60\x00\x00\x00\x04\x05");
+    answer("\x60\x60\x60\x00\0\0\0\0");
+    TEST_ASSERT_EQUAL(SDO_DONE, sdo.state);
+    sdo_read(&sdo, 0x1008, 0, 3);
+    expect("\x40\x08\x10\x00\0\0\0\0");
+    wait();
+    expect("\x80\x08\x10\x00\x00\x00\x04\x05");
+    answer("\x41\x08\x10\x00\x0A\0\0\0");
+    expect_nothing();
+    TEST_ASSERT_EQUAL(SDO_BUSY, sdo.state);
+    wait();
+    expect("\x40\x08\x10\x00\0\0\0\0");
+    answer("\x41\x08\x10\x00\x0A\0\0\0");
+    expect("\x60\0\0\0\0\0\0\0");
+    wait();
+    expect("\x80\x08\x10\x00\x00\x00\x04\x05");
+    answer("\x09"
+           "ABC\0\0\0\0");
+    TEST_ASSERT_EQUAL(SDO_BUSY, sdo.state);
 }
 
 static void test_step_second_attempt_that_is_answered_is_as_good(void)
@@ -319,7 +418,10 @@ int main(void)
     RUN_TEST(test_read_segments_are_put_together);
     RUN_TEST(test_write_segments_are_taken_apart);
     RUN_TEST(test_receive_repeated_segment_is_dropped);
-    RUN_TEST(test_receive_toggle_wrong_for_good_ends_in_silence);
+    RUN_TEST(test_receive_toggle_wrong_for_good_is_named);
+    RUN_TEST(test_receive_short_answers_count_if_they_are_whole);
+    RUN_TEST(test_step_answers_that_cannot_be_used_are_named);
+    RUN_TEST(test_receive_in_the_pause_whole_answers_count);
     RUN_TEST(test_read_more_than_there_is_room_for_is_refused);
     RUN_TEST(test_receive_abort_ends_the_transfer_with_its_code);
     RUN_TEST(test_receive_about_something_else_is_dropped);

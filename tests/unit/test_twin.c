@@ -413,10 +413,11 @@ static void test_options_that_mean_nothing_are_refused(void)
 
 static void test_faults_every_line_of_the_table_can_be_read_and_done(void)
 {
-    static const char *const k_words[] = {
-        "DRIVE", "2",     "CODE", "0x1000",      "COUNT",   "3",      "MS",          "5",     "NUMBER",  "1",      "SET",
-        "1",     "CLEAR", "2",    "INDEX[:SUB]", "6065:0",  "ABORT",  "0x06010000",  "VALUE", "1",       "NODE",   "9",
-        "MM_S",  "5",     "MM",   "1",           "ADDRESS", "0x0300", "open|closed", "open",  "SECTION", "healthy"};
+    static const char *const k_words[] = {"DRIVE",       "2",      "CODE",    "0x1000",     "COUNT", "3",         "MS",
+                                          "5",           "NUMBER", "1",       "SET",        "1",     "CLEAR",     "2",
+                                          "INDEX[:SUB]", "6065:0", "ABORT",   "0x06010000", "VALUE", "1",         "NODE",
+                                          "9",           "MM_S",   "5",       "MM",         "1",     "ADDRESS",   "0x0300",
+                                          "open|closed", "open",   "SECTION", "healthy",    "NAME",  "slow-reset"};
     const char *name;
     const char *arguments;
     const char *help;
