@@ -86,6 +86,21 @@ typedef enum {
     CIA402_STOP    /**< a fault of the drive: all drives stop, and this one is not enabled */
 } cia402_reaction_t;
 
+/** Watchdogs that heaved switches on in a drive, so that it stops by itself. */
+typedef enum {
+    CIA402_GUARD_CONSUMER,   /**< 1016h: of the gateway's heartbeat */
+    CIA402_GUARD_PRODUCER,   /**< 1017h: the drive's heartbeat */
+    CIA402_GUARD_TIME,       /**< 100Ch: node guarding */
+    CIA402_GUARD_LIFE,       /**< 100Dh */
+    CIA402_GUARD_CONNECTION, /**< 6007h: what the drive does when the gateway is gone */
+    CIA402_GUARD_QUICK_STOP, /**< 605Ah */
+    CIA402_GUARD_FAULT,      /**< 605Eh: what it does with a fault */
+    CIA402_GUARD_WINDOW,     /**< 6065h: following error */
+    CIA402_GUARDS
+} cia402_guard_t;
+
+#define CIA402_GUARDS_ALL ((uint8_t)((1u << CIA402_GUARDS) - 1u))
+
 /** An object of a start-up list: a setting that a family of drives needs in addition to the settings of all drives. */
 typedef struct {
     uint32_t value; /**< the low bytes count */
@@ -172,7 +187,8 @@ typedef struct {
     bool is_guarded;           /**< node guarding in place of heartbeats, of both sides: for drives that have none */
     bool is_sync_watched;      /**< 1006h holds the period: drives may stop if SYNC is late */
     bool is_reset_wanted;      /**< reset communication before setting up */
-    bool is_unguarded_allowed; /**< drives without watchdogs are accepted */
+    uint16_t rpdo_deadline_ms; /**< 1400h:05; 0 = left as it is */
+    uint8_t accepted_without;  /**< watchdogs that drives may lack, or have off: bit N for cia402_guard_t N */
     bool is_homing_in_turn;    /**< one drive after the other */
     bool is_support_checked;   /**< drives whose 6502h or 60E3h do not list the configured mode or homing method are refused */
     cia402_reaction_t reaction[CIA402_WATCHES];
@@ -237,11 +253,12 @@ typedef struct {
     uint32_t entry[CIA402_PDO_ENTRIES]; /**< as cia402_map_t has them, with the indices of their channels */
     uint8_t entries;                    /**< 0 = not in use */
     uint8_t bytes;
-    uint8_t every;   /**< SYNCs from one to the next */
-    uint8_t start;   /**< 1800h:06, see cia402_sync_start() */
-    uint16_t record; /**< 1400h or 1800h and so on; the map is 200h further */
-    uint16_t id;     /**< CAN identifier */
-    bool is_fixed;   /**< the map is not written */
+    uint8_t every;        /**< SYNCs from one to the next */
+    uint8_t start;        /**< 1800h:06, see cia402_sync_start() */
+    uint16_t deadline_ms; /**< 1400h:05; 0 = left as it is, and of TPDOs */
+    uint16_t record;      /**< 1400h or 1800h and so on; the map is 200h further */
+    uint16_t id;          /**< CAN identifier */
+    bool is_fixed;        /**< the map is not written */
 } cia402_pdo_t;
 
 /** State of one drive; private. Ordered so that there is no padding. */
@@ -397,6 +414,9 @@ typedef enum {
     CIA402_WISH_GUARD,   /**< refused unless drives without guards are allowed */
     CIA402_WISH_IF_THERE /**< nothing */
 } cia402_wish_need_t;
+
+/** True if drives may lack the watchdog with this index; the axes of a node have theirs at further indices. */
+bool cia402_accepts_without(const cia402_config_t *config, uint16_t index);
 
 /** An object of the configuration of a drive. Set all members to 0 before the first call. */
 typedef struct {

@@ -180,6 +180,7 @@ static cia402_pdo_t listed(const cia402_config_t *config, unsigned axis, unsigne
     const cia402_map_t map = maps->count != 0 ? maps->map[n] : usual_map(config, axis, is_answer);
     cia402_pdo_t out = describe(config, axis, &map, channel * cia402_map_count(maps) + n, is_answer);
     out.is_fixed = maps->count != 0 && config->are_maps_fixed;
+    out.deadline_ms = is_answer ? 0 : config->rpdo_deadline_ms;
     return out;
 }
 

@@ -400,6 +400,21 @@ bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *co
 
 /* --- For others --- */
 
+bool cia402_accepts_without(const cia402_config_t *config, uint16_t index)
+{
+    static const uint16_t k_guards[CIA402_GUARDS] = {
+        [CIA402_GUARD_CONSUMER] = 0x1016, [CIA402_GUARD_PRODUCER] = 0x1017,   [CIA402_GUARD_TIME] = 0x100C,
+        [CIA402_GUARD_LIFE] = 0x100D,     [CIA402_GUARD_CONNECTION] = 0x6007, [CIA402_GUARD_QUICK_STOP] = 0x605A,
+        [CIA402_GUARD_FAULT] = 0x605E,    [CIA402_GUARD_WINDOW] = 0x6065,
+    };
+    for (unsigned i = 0; i < CIA402_GUARDS; i++) {
+        if (k_guards[i] == cia402_plain_index(index)) {
+            return (config->accepted_without >> i & 1u) != 0;
+        }
+    }
+    return false;
+}
+
 static cia402_wish_need_t need_of(const cia402_object_t *row)
 {
     if (row->need == CIA402_GUARD) {

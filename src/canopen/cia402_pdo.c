@@ -135,9 +135,8 @@ static uint64_t data_of(const can_frame_t *frame)
     return data;
 }
 
-static void apply_entries(cia402_t *self, unsigned axis, const cia402_pdo_t *pdo, const can_frame_t *frame)
+static void apply_entries(cia402_t *self, unsigned axis, cia402_drive_t drive, const cia402_pdo_t *pdo, const can_frame_t *frame)
 {
-    cia402_drive_t drive = cia402_drive(self, axis);
     const uint64_t data = data_of(frame);
     unsigned at = 0;
     for (unsigned i = 0; i < pdo->entries && at < 8u * CIA402_PDO_BYTES; i++) {
@@ -153,21 +152,30 @@ static void apply_entries(cia402_t *self, unsigned axis, const cia402_pdo_t *pdo
     }
 }
 
+static bool is_mate(const cia402_t *self, unsigned axis, unsigned k)
+{
+    return k != axis && self->config->axis[k].node == self->config->axis[axis].node;
+}
+
 /* Of an axis, or of all of its node. */
 static void receive_answer(cia402_t *self, unsigned axis, unsigned n, const cia402_pdo_t *pdo, const can_frame_t *frame)
 {
     const uint8_t all = (uint8_t)((1u << cia402_map_count(&self->config->answers)) - 1u);
-    const bool is_of_node = cia402_map_is_shared(&self->config->answers);
-    const unsigned first = is_of_node ? 0 : axis;
-    const unsigned end = is_of_node ? self->config->axes : axis + 1u;
-    for (unsigned k = first; k < end; k++) {
-        if (self->config->axis[k].node == self->config->axis[axis].node) {
+    const unsigned mates = cia402_map_is_shared(&self->config->answers) ? self->config->axes : 0;
+    const cia402_drive_t drive = cia402_drive(self, axis);
+    cia402_axis_note_answer(drive, n, all);
+    for (unsigned k = 0; k < mates; k++) {
+        if (is_mate(self, axis, k)) {
             cia402_axis_note_answer(cia402_drive(self, k), n, all);
         }
     }
-    apply_entries(self, axis, pdo, frame);
-    for (unsigned k = first; k < end && n == 0; k++) {
-        if (self->config->axis[k].node == self->config->axis[axis].node) {
+    apply_entries(self, axis, drive, pdo, frame);
+    if (n > 0) {
+        return;
+    }
+    cia402_axis_count_answer(drive);
+    for (unsigned k = 0; k < mates; k++) {
+        if (is_mate(self, axis, k)) {
             cia402_axis_count_answer(cia402_drive(self, k));
         }
     }
@@ -183,7 +191,7 @@ static void receive_pdo(cia402_t *self, unsigned axis, unsigned which, const can
     if (which < CIA402_TELEMETRY) {
         receive_answer(self, axis, which - CIA402_ANSWER, pdo, frame);
     } else if (self->axis[axis].phase == CIA402_UP) {
-        apply_entries(self, axis, pdo, frame);
+        apply_entries(self, axis, cia402_drive(self, axis), pdo, frame);
     }
 }
 

@@ -34,7 +34,7 @@ static cia402_object_t if_there(unsigned index, unsigned sub, uint8_t bytes)
     return row;
 }
 
-/* Type, gap, event timer, SYNC start value: what does not concern RPDOs is left out. */
+/* Type, gap, event timer or deadline, SYNC start value: what does not concern RPDOs is left out. */
 static cia402_object_t pdo_head(const cia402_pdo_t *pdo, unsigned item, bool is_off_already)
 {
     const bool is_sent = pdo->record >= TPDOS;
@@ -46,6 +46,9 @@ static cia402_object_t pdo_head(const cia402_pdo_t *pdo, unsigned item, bool is_
     case 2:
         return is_sent ? if_there(pdo->record, 3, 2) : nothing();
     case 3:
+        if (pdo->deadline_ms != 0) {
+            return pdo_value(pdo->record, 5, 2, CIA402_SET, pdo->deadline_ms);
+        }
         return is_sent ? if_there(pdo->record, 5, 2) : nothing();
     default:
         if (is_sent && pdo->start != 0) {

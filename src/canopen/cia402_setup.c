@@ -145,11 +145,13 @@ static cia402_setup_result_t reject(const visit_t *self, uint32_t code)
 static cia402_setup_result_t give_up(const visit_t *self, uint32_t code)
 {
     const cia402_object_t *row = &self->row;
-    if (row->need == CIA402_MUST || (row->need == CIA402_GUARD && !self->config->is_unguarded_allowed)) {
+    const uint32_t object = row->index != 0 ? object_of(row) : 0x101700u; /* the heartbeat that is waited for */
+    const bool is_accepted = row->need == CIA402_GUARD && cia402_accepts_without(self->config, (uint16_t)(object >> 8));
+    if (row->need == CIA402_MUST || (row->need == CIA402_GUARD && !is_accepted)) {
         return reject(self, code);
     }
     if (row->need == CIA402_GUARD) {
-        self->axis->warned_object = row->index != 0 ? object_of(row) : 0x101700u;
+        self->axis->warned_object = object;
     }
     next_row(self);
     return CIA402_SETUP_BUSY;

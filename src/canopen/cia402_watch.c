@@ -19,8 +19,10 @@ static bool has(const cia402_axis_t *axis, uint16_t bit)
 /* A change of mode is asked for without torque only. A drive that shows none without torque may need a moment. */
 static bool is_out_of_mode(const cia402_axis_t *axis)
 {
-    const bool is_hidden = axis->hides_mode && axis->mode_shown == 0 && !axis->has_shown_mode;
-    return is_enabled(axis) && axis->setup.job == CIA402_JOB_NONE && axis->mode_shown != (int8_t)axis->setup.mode && !is_hidden;
+    if (axis->mode_shown == (int8_t)axis->setup.mode || !is_enabled(axis) || axis->setup.job != CIA402_JOB_NONE) {
+        return false;
+    }
+    return !axis->hides_mode || axis->mode_shown != 0 || axis->has_shown_mode;
 }
 
 /* Some drives never show bit 12 in CSP: counts where it was there. In PP it means something else. */

@@ -282,6 +282,9 @@ typedef struct {
     bool has_inputs;
     uint8_t telemetry_every;
     bool is_no_watchdog_allowed;
+    uint16_t rpdo_deadline_ms;
+    uint16_t accepted_without; /**< bit N for cia402_guard_t N */
+    bool is_stop_confirmed;
     q16_t software_limit_mm_q16;
     uint32_t vendor_id;
     uint32_t product_code;

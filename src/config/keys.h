@@ -54,6 +54,7 @@ extern const config_type_t
     config_type_step,  /**< `none`, or a frame, -> and its answer, wait and ms, stored as canraw_step_t; `words` as for a frame */
     config_type_when,  /**< `none`, or value/mask, stored as canraw_when_t */
     config_type_nodes, /**< nodes and their axes, stored as config_ids_t */
+    config_type_set,   /**< `none`, or some of `words`, stored as a bit for each in `size` bytes */
     config_type_words, /**< one of `words` for all drives, or one for each, stored as config_words_t */
     config_type_maps,  /**< `none`, or maps of PDOs, stored as config.h has them */
     config_type_hosts, /**< `none`, or IPv4 addresses with or without a port, stored as config_hosts_t */

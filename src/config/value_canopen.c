@@ -112,17 +112,64 @@ static void format_words(const config_key_t *key, const config_t *config, const 
     }
 }
 
-static void allowed_words(const config_key_t *key, config_text_t *text)
+static void add_all_words(const config_key_t *key, config_text_t *text)
 {
     for (const char *word = key->words; word != NULL;) {
         const size_t length = strcspn(word, "|");
         config_text_add(text, "%s%.*s", word == key->words ? "" : word[length] == '|' ? ", " : _(" or "), (int)length, word);
         word = word[length] == '|' ? word + length + 1 : NULL;
     }
+}
+
+static void allowed_words(const config_key_t *key, config_text_t *text)
+{
+    add_all_words(key, text);
     config_text_add(text, _("; or one for each drive"));
 }
 
 const config_type_t config_type_words = {.parse = parse_words, .format = format_words, .allowed = allowed_words};
+
+/* --- Some of the words --- */
+
+static bool parse_set(const config_key_t *key, const char *text, void *field, config_text_t *why)
+{
+    int64_t bits = 0;
+    for (const char *rest = text; rest != NULL;) {
+        const span_t item = span_next_item(&rest);
+        const int index = span_find_word(key->words, item);
+        if (index < 0) {
+            return config_value_reject(key, item, _("is not allowed"), why);
+        }
+        bits |= (int64_t)1 << index;
+    }
+    config_value_store(field, key->size, bits);
+    return true;
+}
+
+static void format_set(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
+{
+    const int64_t bits = config_value_load(field, key->size);
+    const char *separator = "";
+    unsigned index = 0;
+    (void)config;
+    for (const char *word = key->words; word != NULL; index++) {
+        const size_t length = strcspn(word, "|");
+        if ((bits >> index & 1) != 0) {
+            config_text_add(text, "%s%.*s", separator, (int)length, word);
+            separator = ", ";
+        }
+        word = word[length] == '|' ? word + length + 1 : NULL;
+    }
+}
+
+static void allowed_set(const config_key_t *key, config_text_t *text)
+{
+    add_all_words(key, text);
+    config_text_add(text, _("; several with commas"));
+}
+
+const config_type_t config_type_set = {
+    .has_none = true, .is_list = true, .parse = parse_set, .format = format_set, .allowed = allowed_set};
 
 /* --- Maps: 1: 0x6040/16 0x607A/32, 3: 0x60C1:01/32 --- */
 

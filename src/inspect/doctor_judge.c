@@ -297,10 +297,11 @@ static void judge_guards(const patient_t *self)
             continue;
         }
         if (!is_read(self, object)) {
-            doctor_say(
-                self->report, self->config->is_unguarded_allowed ? DOCTOR_WARN : DOCTOR_FAIL,
-                _("node %s has no watchdog %04Xh -> another drive, or [cia402] allow_no_watchdog = yes where nobody is on it"),
-                self->name, index);
+            doctor_say(self->report, cia402_accepts_without(self->config, (uint16_t)index) ? DOCTOR_WARN : DOCTOR_FAIL,
+                       _("node %s has no watchdog %04Xh -> another drive, or [cia402] accept_without = %04X where it has been "
+                         "tried that "
+                         "the drive stops without it"),
+                       self->name, index, index);
         } else if (!is_guarding(self, object)) {
             const size_t length = strlen(off);
             (void)snprintf(off + length, sizeof off - length, " %04Xh", index);

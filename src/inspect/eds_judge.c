@@ -78,7 +78,8 @@ static void say(judge_t *self, doctor_level_t level, const char *text)
 
 static doctor_level_t level_of(const judge_t *self, const cia402_wish_t *wish)
 {
-    if (wish->need == CIA402_WISH_IF_THERE || (wish->need == CIA402_WISH_GUARD && self->drives->is_unguarded_allowed)) {
+    if (wish->need == CIA402_WISH_IF_THERE ||
+        (wish->need == CIA402_WISH_GUARD && cia402_accepts_without(self->drives, wish->index))) {
         return DOCTOR_WARN;
     }
     return DOCTOR_FAIL;
@@ -90,8 +91,9 @@ static const char *remedy_of(const judge_t *self, const cia402_wish_t *wish)
         return _("nothing, heaved goes on without it");
     }
     if (wish->need == CIA402_WISH_GUARD) {
-        return self->drives->is_unguarded_allowed ? _("nothing, [cia402] allow_no_watchdog = yes")
-                                                  : _("another drive, or [cia402] allow_no_watchdog = yes where nobody is on it");
+        return cia402_accepts_without(self->drives, wish->index)
+                   ? _("nothing, [cia402] accepts drives without it")
+                   : _("another drive, or [cia402] accept_without where it has been tried that the drive stops without it");
     }
     return wish->index >= PDO_FIRST && wish->index <= PDO_LAST ? _("a drive whose PDOs can be mapped")
                                                                : _("another drive, or firmware");

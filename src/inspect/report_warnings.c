@@ -165,6 +165,16 @@ static bool is_local(const config_t *config)
     return strncmp(config->udp.bind, "127.", 4) == 0 || strcmp(config->udp.bind, "::1") == 0;
 }
 
+static void warn_watchdogs(report_t *self)
+{
+    const config_cia402_t *cia402 = &self->config->cia402;
+    if (self->config->drives == CONFIG_DRIVES_CIA402 && cia402->is_no_watchdog_allowed) {
+        warn(self,
+             N_("[cia402] allow_no_watchdog = yes accepts drives without any watchdog, and nothing says which they lack: name "
+                "those in accept_without"));
+    }
+}
+
 /* What is meant here and forgotten there: nothing is wrong with it. */
 static void write_notes(const report_t *self)
 {
@@ -267,5 +277,6 @@ void report_write_warnings(report_t *self)
         warn(self, "[platform] approved: another configuration was approved; nothing moves until `heavectl acknowledge`");
     }
     warn_profile_lag(self);
+    warn_watchdogs(self);
     write_notes(self);
 }

@@ -11,6 +11,7 @@
 
 #define SECTION           "cia402"
 #define NODE_MAX          127u
+#define DEADLINE_PERIODS  4u
 #define WINDOW_PERIODS    3u /* a drive lags by its own lag and by one or two periods */
 #define HOMING_METHOD_MAX 127
 
@@ -222,6 +223,12 @@ static void check_times(config_source_t *self)
         config_source_key_error(self, SECTION, "answer_every",
                                 "mode = pp needs the answer to every SYNC; allowed: 1, or another mode");
     }
+    if (cia402->rpdo_deadline_ms != 0 &&
+        cia402->rpdo_deadline_ms * UINT64_C(1000) < DEADLINE_PERIODS * (uint64_t)cia402->period_us) {
+        config_source_key_error(self, SECTION, "rpdo_deadline_ms",
+                                "less than four periods: one late command would stop a drive; allowed: 0, or at least %u ms",
+                                (DEADLINE_PERIODS * cia402->period_us + 999u) / 1000u);
+    }
     if ((cia402->csp_control_bits & ~CIA402_CSP_CONTROL_BITS) != 0) {
         config_source_key_error(
             self, SECTION, "csp_control_bits",
@@ -229,6 +236,17 @@ static void check_times(config_source_t *self)
     }
     if (cia402->sync_counter == 1) {
         config_source_key_error(self, SECTION, "sync_counter", "a counter cannot end at 1; allowed: 0, or 2 to 240");
+    }
+}
+
+/* A drive that lacks a watchdog may go on moving when heaved has failed. Only trying it shows what it does. */
+static void check_watchdogs(config_source_t *self)
+{
+    const config_cia402_t *cia402 = &self->config->cia402;
+    if (cia402->accepted_without != 0 && !cia402->is_stop_confirmed) {
+        config_source_key_error(self, SECTION, "accept_without",
+                                "heaved cannot see what such a drive does when heaved fails; allowed: none, or with "
+                                "stop_confirmed = yes where somebody has tried it");
     }
 }
 
@@ -275,6 +293,7 @@ void config_cia402_check(config_source_t *self)
     check_methods(self, "homing_method", &cia402->homing.method, cylinders_of(self));
     check_period(self);
     check_times(self);
+    check_watchdogs(self);
     check_profile_lag(self);
     check_window(self, "following_error_mm", cia402->following_error_mm_q16, settings->cylinder_speed_mm_s_q16, "mm");
     if (settings->has_angle) {

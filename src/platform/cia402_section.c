@@ -174,7 +174,8 @@ void config_cia402(const config_t *config, cia402_config_t *out)
         .telemetry_every = cia402->telemetry_every,
         .is_sync_watched = cia402->is_sync_watched,
         .is_reset_wanted = cia402->is_reset_wanted,
-        .is_unguarded_allowed = cia402->is_no_watchdog_allowed,
+        .accepted_without = cia402->is_no_watchdog_allowed ? CIA402_GUARDS_ALL : (uint8_t)cia402->accepted_without,
+        .rpdo_deadline_ms = cia402->rpdo_deadline_ms,
         .is_support_checked = cia402->is_support_checked,
         .is_homing_in_turn = cia402->homing_order == CONFIG_HOMING_IN_TURN,
     };

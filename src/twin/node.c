@@ -13,6 +13,7 @@
 #define HEARTBEAT_LOST 0x8130u
 #define SYNC_LATE      0x8100u
 #define SYNC_LENGTH    0x8240u
+#define RPDO_LATE      0x8250u
 
 #define RESET_SHARE 4u   /* a reset of the communication takes so much less than a boot */
 #define LOOK_US     1000 /* an axis with power is looked at so often */
@@ -48,6 +49,7 @@ static void enter(node_t *self, uint8_t nmt)
     const uint8_t was = self->nmt;
     self->nmt = nmt;
     if (was == NODE_OPERATIONAL && nmt != NODE_OPERATIONAL) {
+        self->rpdo_due_us = DRIVE_NEVER;
         drive_connection_lost(&self->drive);
     }
     if (was != NODE_OPERATIONAL && nmt == NODE_OPERATIONAL) {
@@ -70,7 +72,7 @@ static void boot(node_t *self, uint32_t delay_us)
 {
     self->nmt = 0;
     self->boot_due_us = self->now_us + delay_us;
-    self->beat_due_us = self->master_due_us = self->sync_due_us = DRIVE_NEVER;
+    self->beat_due_us = self->master_due_us = self->sync_due_us = self->rpdo_due_us = DRIVE_NEVER;
     self->pending = 0;
     self->waits = 0;
     self->guard_toggle = 0;
@@ -378,6 +380,11 @@ void node_advance(node_t *self, uint64_t now_us)
     if (now_us >= self->sync_due_us) {
         sync_late(self);
     }
+    if (now_us >= self->rpdo_due_us) {
+        self->rpdo_due_us = DRIVE_NEVER;
+        node_emergency(self, RPDO_LATE, 0x11);
+        drive_connection_lost(&self->drive);
+    }
     send_emergency(self);
     node_put_events(self);
     node_put_due(self);
@@ -395,7 +402,7 @@ uint64_t node_due_us(const node_t *self)
         return DRIVE_NEVER;
     }
     due_us = least(due_us, least(self->boot_due_us, self->beat_due_us));
-    due_us = least(due_us, least(self->master_due_us, self->sync_due_us));
+    due_us = least(due_us, least(self->rpdo_due_us, least(self->master_due_us, self->sync_due_us)));
     for (uint32_t i = 0; i < self->waits; i++) {
         due_us = least(due_us, self->waiting[i].due_us);
     }

@@ -51,6 +51,7 @@ typedef struct node {
     bool is_powered;
     uint8_t nmt; /**< 0 = booting */
     uint64_t boot_due_us, beat_due_us, master_due_us, sync_due_us;
+    uint64_t rpdo_due_us; /**< of one RPDO that has a deadline */
     uint8_t guard_toggle; /**< of its next answer to guarding */
     uint64_t now_us;
     uint32_t pending; /**< bit N: RPDO N waits for SYNC */

@@ -164,8 +164,16 @@ static void apply(node_t *self, uint16_t n, const uint8_t *data)
     }
 }
 
+/* 1400h:05, watched from the first one on. */
+static void start_deadline(node_t *self, uint16_t n)
+{
+    const uint32_t deadline_ms = objects_get(&self->drive.od, (uint16_t)(0x1400 + n), 5);
+    self->rpdo_due_us = deadline_ms == 0 ? self->rpdo_due_us : self->now_us + deadline_ms * 1000u;
+}
+
 static void hear_rpdo(node_t *self, uint16_t n, const can_frame_t *frame)
 {
+    start_deadline(self, n);
     if (frame->length < objects_mapped_bytes(&self->drive.od, (uint16_t)(0x1600 + n))) {
         node_emergency(self, PDO_SHORT, 0x11);
     } else if (objects_get(&self->drive.od, (uint16_t)(0x1400 + n), 2) > NODE_SYNCHRONOUS_MAX) {

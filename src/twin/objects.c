@@ -62,9 +62,10 @@ static void add_pdos(objects_t *self, uint8_t node, bool is_first)
     for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
         const uint32_t off = n < 2 && is_first ? 0 : INVALID;
         const uint32_t step = 0x100u * n + node;
-        objects_add(self, (object_t)RO((uint16_t)(0x1400 + n), 0, 1, 2));
+        objects_add(self, (object_t)RO((uint16_t)(0x1400 + n), 0, 1, 5));
         objects_add(self, (object_t)RW((uint16_t)(0x1400 + n), 1, 4, (0x200 + step) | off));
         objects_add(self, (object_t)RW((uint16_t)(0x1400 + n), 2, 1, EVENT));
+        objects_add(self, (object_t)RW((uint16_t)(0x1400 + n), 5, 2, 0));
         objects_add(self, (object_t)RO((uint16_t)(0x1800 + n), 0, 1, 6));
         objects_add(self, (object_t)RW((uint16_t)(0x1800 + n), 1, 4, (0x180 + step) | off | NO_RTR));
         objects_add(self, (object_t)RW((uint16_t)(0x1800 + n), 2, 1, EVENT));

@@ -155,7 +155,7 @@ def not_402(bench, config):
 def missing_watchdog(bench, config):
     bench.start_drives("0 missing 6 6007")
     doctor(bench, config, 1, "node 6 has no watchdog 6007h")
-    doctor(bench, with_keys(bench, config, allow_no_watchdog="yes"), 0, "node 6 has no watchdog 6007h")
+    doctor(bench, with_keys(bench, config, accept_without="605E, 6007", stop_confirmed="yes"), 0, "node 6 has no watchdog 6007h")
 
 
 def watchdogs_off(bench, config):

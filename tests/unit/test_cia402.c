@@ -634,7 +634,7 @@ static void test_setup_missing_guard_is_refused_unless_allowed(void)
         TEST_ASSERT_EQUAL_HEX32((uint32_t)k_guards[i] << 8 | sub, refused.object);
         setUp();
         canopen_drives_object(&twin, 1, k_guards[i], sub)->is_missing = true;
-        config.is_unguarded_allowed = true;
+        config.accepted_without = CIA402_GUARDS_ALL;
         come_up();
         TEST_ASSERT_EQUAL_HEX32((uint32_t)k_guards[i] << 8 | sub, report(1).object);
         enable();
@@ -670,7 +670,8 @@ static void test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allo
 {
     for (unsigned is_allowed = 0; is_allowed < 2; is_allowed++) {
         setUp();
-        config.is_unguarded_allowed = is_allowed != 0;
+        config.accepted_without =
+            is_allowed != 0 ? 1u << CIA402_GUARD_CONSUMER : (uint8_t)(CIA402_GUARDS_ALL & ~(1u << CIA402_GUARD_CONSUMER));
         object_t *row = canopen_drives_object(&twin, 1, 0x1016, 1);
         row->is_read_only = true;
         row->value = row->fallback = 0x7F012D;
@@ -699,7 +700,7 @@ static void test_setup_without_heartbeats_is_refused(void)
 static void test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_its_tpdos(void)
 {
     twin.drive[5].node.has_no_heartbeat = true;
-    config.is_unguarded_allowed = true;
+    config.accepted_without = 1u << CIA402_GUARD_PRODUCER;
     come_up();
     TEST_ASSERT_EQUAL_HEX32(0x101700, report(5).object);
     TEST_ASSERT_EQUAL_STRING("its guard is off, which the configuration allows", report(5).detail);
@@ -710,6 +711,69 @@ static void test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_
     TEST_ASSERT_TRUE(cycles_until(5, DRIVE_OFFLINE, 100) <= 4 * PERIOD + 1);
     TEST_ASSERT_EQUAL_HEX32(CIA402_LOST_TPDO, feedback[5].fault_code);
     TEST_ASSERT_EQUAL_STRING("", report(5).detail);
+}
+
+/* Each by itself: who accepts one that is missing does not accept another one. */
+static void test_setup_guards_are_accepted_one_by_one(void)
+{
+    static const struct {
+        uint16_t index;
+        uint8_t sub;
+        cia402_guard_t guard;
+    } k_rows[] = {{0x1016, 1, CIA402_GUARD_CONSUMER},   {0x1017, 0, CIA402_GUARD_PRODUCER}, {0x6007, 0, CIA402_GUARD_CONNECTION},
+                  {0x605A, 0, CIA402_GUARD_QUICK_STOP}, {0x605E, 0, CIA402_GUARD_FAULT},    {0x6065, 0, CIA402_GUARD_WINDOW},
+                  {0x100C, 0, CIA402_GUARD_TIME},       {0x100D, 0, CIA402_GUARD_LIFE}};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        const bool is_guarded = k_rows[i].index == 0x100C || k_rows[i].index == 0x100D;
+        for (unsigned is_accepted = 0; is_accepted < 2; is_accepted++) {
+            setUp();
+            config.is_guarded = is_guarded;
+            config.accepted_without =
+                is_accepted != 0 ? 1u << k_rows[i].guard : (uint8_t)(CIA402_GUARDS_ALL & ~(1u << k_rows[i].guard));
+            canopen_drives_object(&twin, 1, k_rows[i].index, k_rows[i].sub)->is_missing = true;
+            TEST_ASSERT_EQUAL(is_accepted != 0, cia402_accepts_without(&config, k_rows[i].index));
+            if (is_accepted == 0) {
+                TEST_ASSERT_EQUAL_HEX32(k_rows[i].index << 8 | k_rows[i].sub, refusal_of(1).object);
+            } else {
+                come_up();
+                TEST_ASSERT_EQUAL_HEX32(k_rows[i].index << 8 | k_rows[i].sub, report(1).object);
+                TEST_ASSERT_EQUAL_STRING("its guard is off, which the configuration allows", report(1).detail);
+            }
+        }
+    }
+    TEST_ASSERT_TRUE(cia402_accepts_without(&config, 0x100D));
+    TEST_ASSERT_FALSE(cia402_accepts_without(&config, 0x6040));
+    config.accepted_without = 1u << CIA402_GUARD_CONNECTION;
+    TEST_ASSERT_TRUE(cia402_accepts_without(&config, 0x6807)); /* of the second axis */
+}
+
+/* A drive without 1016h notices by its RPDOs that heaved has gone. */
+static void test_setup_deadline_of_commands_stops_a_drive_that_watches_no_heartbeat(void)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        setUp();
+        config.accepted_without = 1u << CIA402_GUARD_CONSUMER;
+        config.rpdo_deadline_ms = 20;
+        for (unsigned k = 0; k < AXES; k++) {
+            canopen_drives_object(&twin, k, 0x1016, 1)->is_missing = true;
+        }
+        if (i == 1) {
+            canopen_drives_object(&twin, 4, 0x1400, 5)->is_missing = true;
+            TEST_ASSERT_EQUAL_HEX32(0x140005, refusal_of(4).object);
+            continue;
+        }
+        come_up();
+        enable();
+        cycles(200);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        for (unsigned n = 0; n < 25; n++) { /* heaved is gone */
+            now_us += CYCLE_US;
+            canopen_drives_step(&twin, now_us);
+        }
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(twin.drive[k].node.drive.state == TWIN_FAULT || twin.drive[k].node.drive.state == TWIN_REACTION);
+        }
+    }
 }
 
 /* It says that it is operational with its next heartbeat, which may take a while. */
@@ -3209,6 +3273,8 @@ int main(void)
     RUN_TEST(test_setup_guard_that_cannot_be_written_is_taken_where_it_is_on);
     RUN_TEST(test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allowed);
     RUN_TEST(test_setup_without_heartbeats_is_refused);
+    RUN_TEST(test_setup_guards_are_accepted_one_by_one);
+    RUN_TEST(test_setup_deadline_of_commands_stops_a_drive_that_watches_no_heartbeat);
     RUN_TEST(test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_its_tpdos);
     RUN_TEST(test_setup_drive_whose_heartbeats_are_rare_is_waited_for);
     RUN_TEST(test_setup_drive_that_goes_operational_by_itself_is_told_again);

@@ -559,6 +559,9 @@ static void test_load_what_contradicts_itself_is_refused_at_its_line(void)
     refuse("period_us = 1000", "the bus would be loaded by");
     refuse("heartbeat_timeout_ms = 99", "allowed: at least 100 ms");
     refuse("sync_counter = 1", "allowed: 0, or 2 to 240");
+    refuse("accept_without = 6007", "stop_confirmed = yes where somebody has tried it");
+    refuse("accept_without = 6040", "allowed: 1016, 1017, 100C, 100D, 6007, 605A, 605E or 6065; several with commas");
+    refuse("rpdo_deadline_ms = 7", "allowed: 0, or at least 16 ms");
     refuse("csp_control_bits = 08", "allowed: 0, 10, 20, 40 and their sums");
     refuse("csp_control_bits = 80", "hexadecimal 0 to 70");
     refuse("following_error_mm = 5.9", "at least 6.00");
@@ -743,6 +746,25 @@ static const char *report(void)
     return text;
 }
 
+/* Older files accept whatever is missing; newer ones name it, and that somebody has tried what then happens. */
+static void test_check_watchdogs_that_may_be_missing(void)
+{
+    cia402_config_t drives;
+    (void)put("[cia402]", "allow_no_watchdog = yes");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(report(), "warning: [cia402] allow_no_watchdog = yes accepts drives without any watchdog"), report());
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_EQUAL_HEX8(CIA402_GUARDS_ALL, drives.accepted_without);
+    setUp();
+    (void)put("[cia402]", "accept_without = 6007, 605E\nstop_confirmed = yes\nrpdo_deadline_ms = 20");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_NULL_MESSAGE(strstr(report(), "watchdog"), report());
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_EQUAL_HEX8(1u << CIA402_GUARD_CONNECTION | 1u << CIA402_GUARD_FAULT, drives.accepted_without);
+    TEST_ASSERT_EQUAL_UINT16(20, drives.rpdo_deadline_ms);
+}
+
 static void test_check_report_says_what_the_scaling_comes_to(void)
 {
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
@@ -790,6 +812,7 @@ int main(void)
     RUN_TEST(test_load_maps_reach_the_driver_and_come_back_as_text);
     RUN_TEST(test_lead_that_is_not_the_whole_story_is_one_error);
     RUN_TEST(test_lead_beside_counts_per_mm_is_an_error_that_names_the_other_line);
+    RUN_TEST(test_check_watchdogs_that_may_be_missing);
     RUN_TEST(test_check_report_says_what_the_scaling_comes_to);
     return UNITY_END();
 }

@@ -349,7 +349,7 @@ static void without_watchdog(unsigned object, bool is_guarded, bool is_allowed)
     setUp();
     refuse(object);
     s_drives.is_guarded = is_guarded;
-    s_drives.is_unguarded_allowed = is_allowed;
+    s_drives.accepted_without = is_allowed ? CIA402_GUARDS_ALL : 0;
     judge_node();
 }
 

@@ -146,8 +146,14 @@ static void test_judge_guard_that_is_missing_may_be_allowed(void)
     put_all(0x600700, NULL, 0, "");
     TEST_ASSERT_FALSE(judge());
     expect("FAIL  6007h:00 is not in it");
-    expect("allow_no_watchdog = yes where nobody is on it");
-    m_config.cia402.is_no_watchdog_allowed = true;
+    expect("accept_without where it has been tried that the drive stops without it");
+    m_config.cia402.accepted_without = 1u << CIA402_GUARD_FAULT;
+    TEST_ASSERT_FALSE(judge());
+    m_config.cia402.accepted_without |= 1u << CIA402_GUARD_CONNECTION;
+    TEST_ASSERT_TRUE(judge());
+    expect("warn  6007h:00 is not in it");
+    m_config.cia402.accepted_without = 0;
+    m_config.cia402.is_no_watchdog_allowed = true; /* an older file */
     TEST_ASSERT_TRUE(judge());
     expect("warn  6007h:00 is not in it");
 }
