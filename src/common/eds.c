@@ -15,6 +15,16 @@
 #define OBJECTS_MAX 65536u
 #define BLANKS      " \t\r\n"
 
+/* Kinds of objects. */
+#define TYPE_ARRAY  8
+#define TYPE_RECORD 9
+
+#define TYPE_U8   5u
+#define RPDOS     0x1400u
+#define TPDOS     0x1800u
+#define PDOS_END  0x1C00u
+#define PDO_COUNT 0x200u /* from the communication of a PDO to its map */
+
 const unsigned eds_bitrates_kbps[] = {10, 20, 50, 125, 250, 500, 800, 1000, 0};
 
 static const struct {
@@ -31,6 +41,7 @@ typedef struct {
     FILE *errors;
     unsigned line;
     eds_object_t *object; /* whose section this is, NULL where it is another one */
+    bool is_group;        /* it is an array or a record */
     bool is_device;       /* [DeviceInfo] */
     bool is_drive;        /* [DeviceComissioning], as the standard spells it */
     bool has_values;      /* [1010Value]: of an array written in short */
@@ -143,6 +154,16 @@ static void enter_object(reader_t *self, uint16_t index, uint8_t sub, bool is_en
                                    .is_place = before != NULL && before->index == index && before->is_place};
 }
 
+/* An array or a record may have the type of its entries, and no value. */
+static void leave_object(reader_t *self)
+{
+    if (self->object != NULL && self->is_group && self->object->compact == 0) {
+        self->object->is_parent = true;
+    }
+    self->object = NULL;
+    self->is_group = false;
+}
+
 /* "1010Value" */
 static bool read_array(const char *name, uint16_t *index)
 {
@@ -166,7 +187,7 @@ static void enter(reader_t *self, char *text)
     char *end = strchr(text, ']');
     uint16_t index = 0;
     uint8_t sub = 0;
-    self->object = NULL;
+    leave_object(self);
     self->is_device = self->is_drive = self->has_values = false;
     if (end == NULL) {
         complain(self, _("a section without ]"), text);
@@ -233,11 +254,20 @@ static bool keep_number(eds_object_t *object, const char *key, const eds_number_
     return place != NULL;
 }
 
+static bool keep_kind(reader_t *self, const char *key, const eds_number_t *found)
+{
+    if (strcasecmp(key, "ObjectType") != 0) {
+        return false;
+    }
+    self->is_group = found->value == TYPE_ARRAY || found->value == TYPE_RECORD;
+    return true;
+}
+
 static void parse_of_object(reader_t *self, const char *key, const char *value)
 {
     eds_object_t *object = self->object;
     const eds_number_t found = number(value);
-    if (keep_number(object, key, &found)) {
+    if (keep_kind(self, key, &found) || keep_number(object, key, &found)) {
         return;
     }
     if (strcasecmp(key, "AccessType") == 0) {
@@ -297,6 +327,9 @@ static void parse_of_device(reader_t *self, const char *key, const char *value)
     } else if (strcasecmp(key, "ProductNumber") == 0) {
         self->eds->product = found;
     }
+    self->eds->has_compact_pdos |= strcasecmp(key, "CompactPDO") == 0 && found.value > 0;
+    self->eds->rpdos = strcasecmp(key, "NrOfRXPDO") == 0 ? (unsigned)found.value : self->eds->rpdos;
+    self->eds->tpdos = strcasecmp(key, "NrOfTXPDO") == 0 ? (unsigned)found.value : self->eds->tpdos;
     for (unsigned i = 0; eds_bitrates_kbps[i] != 0; i++) {
         (void)snprintf(name, sizeof name, "BaudRate_%u", eds_bitrates_kbps[i]);
         if (strcasecmp(key, name) == 0) {
@@ -344,6 +377,32 @@ static void parse_line(reader_t *self, char *text)
     }
 }
 
+/* What an entry leaves out is that of its array or record. Entry 0 is the number of the others. */
+static void inherit(eds_t *self)
+{
+    const eds_object_t *parent = NULL;
+    for (size_t i = 0; i < self->objects; i++) {
+        eds_object_t *object = &self->object[i];
+        if (object->is_parent) {
+            parent = object;
+        } else if (parent != NULL && parent->index == object->index) {
+            const bool has_access = object->is_readable || object->is_writable;
+            object->type = object->type != 0 ? object->type : object->sub == 0 ? TYPE_U8 : parent->type;
+            object->is_readable |= !has_access && (object->sub == 0 || parent->is_readable);
+            object->is_writable |= !has_access && object->sub != 0 && parent->is_writable;
+        }
+    }
+}
+
+/* The rest of a line that is longer than the buffer. */
+static void skip_rest(FILE *in)
+{
+    int byte = 0;
+    do {
+        byte = fgetc(in);
+    } while (byte != '\n' && byte != EOF);
+}
+
 bool eds_read(eds_t *self, FILE *in, const char *name, FILE *errors)
 {
     char text[LINE_BYTES];
@@ -353,12 +412,16 @@ bool eds_read(eds_t *self, FILE *in, const char *name, FILE *errors)
         const size_t mark = reader.line++ == 0 ? encoding_mark(text, strlen(text)) : 0;
         if (reader.line == 1 && encoding_is_utf16(text, strlen(text))) {
             complain(&reader, _("allowed: plain text (UTF-8)"), _("the file is UTF-16"));
+        } else if (strchr(text, '\n') == NULL && !feof(in) && text[mark + strspn(text + mark, BLANKS)] == ';') {
+            skip_rest(in);
         } else if (strchr(text, '\n') == NULL && !feof(in)) {
             complain(&reader, _("the line is too long"), text);
         } else {
             parse_line(&reader, text + mark);
         }
     }
+    leave_object(&reader);
+    inherit(self);
     if (!reader.is_bad && ferror(in)) {
         complain(&reader, error_text(errno), _("cannot be read"));
     }
@@ -387,6 +450,13 @@ const eds_object_t *eds_find(const eds_t *self, uint16_t index, uint8_t sub)
         }
     }
     return compact;
+}
+
+bool eds_is_compact_pdo(const eds_t *self, uint16_t index)
+{
+    const unsigned number = index & (PDO_COUNT - 1u);
+    const bool is_pdo = index >= RPDOS && index < PDOS_END;
+    return self->has_compact_pdos && is_pdo && number < (index < TPDOS ? self->rpdos : self->tpdos);
 }
 
 uint8_t eds_bytes(const eds_object_t *object)

@@ -25,7 +25,7 @@ typedef struct {
     bool is_readable;
     bool is_writable;
     bool is_mappable;
-    bool is_parent;  /**< has no value of its own, only sub-indices */
+    bool is_parent;  /**< has no value of its own, only sub-indices, which may have its type and access */
     bool is_place;   /**< by its name, or that of its record, the node id or the bit rate */
     uint16_t type;   /**< as in the file: 5 is u8, and so on */
     uint8_t compact; /**< so many sub-indices have the attributes of this */
@@ -44,6 +44,8 @@ typedef struct {
     unsigned stray_line; /**< of the first */
     unsigned bitrates;   /**< bit N: the Nth of eds_bitrates_kbps */
     bool has_bitrates;
+    bool has_compact_pdos; /**< the objects of PDOs are not in the file (CompactPDO), but in the device: */
+    unsigned rpdos, tpdos; /**< so many of them */
 } eds_t;
 
 /** What a file can say of bit rates; ends with 0. */
@@ -61,6 +63,9 @@ const eds_object_t *eds_find(const eds_t *self, uint16_t index, uint8_t sub);
 
 /** Bytes of a value; 0 where it is no whole number of up to 32 bits. */
 uint8_t eds_bytes(const eds_object_t *object);
+
+/** True where the file leaves out an object of a PDO that the device has. */
+bool eds_is_compact_pdo(const eds_t *self, uint16_t index);
 
 /** A value as its type has it: 0xFFF9 is -7 in an i16. */
 int64_t eds_shown(const eds_object_t *object, uint32_t value);

@@ -38,7 +38,7 @@ bool config_startup_is_list(const config_section_t *section)
 /* Signed numbers are what they were as unsigned ones: to the drive it is the same. */
 void config_startup_format(const cia402_item_t *item, config_text_t *text)
 {
-    config_text_add(text, "0x%04X:%02u %s 0x%" PRIX32 " u%u%s%s%s", (unsigned)item->index, item->sub,
+    config_text_add(text, "0x%04X:%s%02X %s 0x%" PRIX32 " u%u%s%s%s", (unsigned)item->index, item->sub > 9 ? "0x" : "", item->sub,
                     item->is_written ? "=" : "is", item->value, 8u * item->bytes, item->is_checked ? "" : " unchecked",
                     item->is_optional ? " if-there" : "", item->is_last ? " last" : "");
 }

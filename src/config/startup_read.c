@@ -40,11 +40,26 @@ static bool read_number(const char *text, int64_t low, int64_t high, int64_t *va
     return errno == 0 && *end == '\0' && *value >= low && *value <= high;
 }
 
-/* "0x2030:01"; the sub-index is decimal, or hexadecimal with 0x. */
+/* One or two hexadecimal digits. Without 0x or a letter, two digits could be meant as decimal ones. */
+static const char *read_sub(const char *text, uint8_t *sub)
+{
+    const bool has_prefix = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
+    const char *digits = text + (has_prefix ? 2 : 0);
+    const size_t length = strlen(digits);
+    if (length < 1 || length > 2 || strspn(digits, "0123456789ABCDEFabcdef") < length) {
+        return _("has no sub-index from 00 to FF behind the colon, hexadecimal");
+    }
+    if (!has_prefix && length == 2 && digits[0] != '0' && strspn(digits, "0123456789") == length) {
+        return _("has a sub-index that may be meant decimal: sub-indices are hexadecimal, such as :0x0A for the tenth; write 0x");
+    }
+    *sub = (uint8_t)strtoul(digits, NULL, 16);
+    return NULL;
+}
+
+/* "0x2030:01" */
 static const char *read_object(char *text, cia402_item_t *item)
 {
     int64_t index = 0;
-    int64_t sub = 0;
     char *colon = strchr(text, ':');
     if (colon == NULL) {
         return _("has no sub-index, such as :00");
@@ -53,12 +68,8 @@ static const char *read_object(char *text, cia402_item_t *item)
     if (strncmp(text, "0x", 2) != 0 || !read_number(text, 1, UINT16_MAX, &index)) {
         return _("has no object such as 0x2030");
     }
-    if (!read_number(colon + 1, 0, UINT8_MAX, &sub)) {
-        return _("has no sub-index from 0 to 255 behind the colon");
-    }
     item->index = (uint16_t)index;
-    item->sub = (uint8_t)sub;
-    return NULL;
+    return read_sub(colon + 1, &item->sub);
 }
 
 static const char *read_value(const char *text, const char *type, cia402_item_t *item)

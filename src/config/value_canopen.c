@@ -179,7 +179,9 @@ static const char *read_entry(const char *at, uint32_t *entry)
     uint32_t sub = 0;
     uint32_t bits = 0;
     at = strncmp(at, "0x", 2) == 0 ? read_number(at, UINT16_MAX, &index) : NULL;
-    at = at != NULL && *at == ':' ? read_number(at + 1, UINT8_MAX, &sub) : at;
+    if (at != NULL && *at == ':') { /* hexadecimal, as everywhere; behind 0x where the two bases differ */
+        at = read_number(at + 1, strncmp(at + 1, "0x", 2) == 0 ? UINT8_MAX : 9, &sub);
+    }
     at = at != NULL && *at == '/' ? read_number(at + 1, 64, &bits) : NULL;
     *entry = index << 16 | sub << 8 | bits;
     return bits != 0 && bits % 8u == 0 ? at : NULL;

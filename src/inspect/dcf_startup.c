@@ -161,11 +161,11 @@ static void write_list(const import_t *self, const eds_t *file, bool is_common_w
         }
         count[verdict]++;
         if (verdict == DCF_LISTED) {
-            fprintf(self->out, "0x%04X:%02u = %" PRId64 " %s%s\n", object->index, object->sub,
+            fprintf(self->out, "0x%04X:%s%02X = %" PRId64 " %s%s\n", object->index, object->sub > 9 ? "0x" : "", object->sub,
                     eds_shown(object, (uint32_t)((uint64_t)object->parameter.value & mask_of(object))), eds_type_name(object),
                     object->is_readable ? "" : " unchecked");
         } else if (verdict != DCF_DEFAULT) {
-            fprintf(self->out, "; 0x%04X:%02u (line %u) %s\n", object->index, object->sub, object->line, why);
+            fprintf(self->out, "; 0x%04X:%02X (line %u) %s\n", object->index, object->sub, object->line, why);
         }
     }
 }

@@ -14,6 +14,7 @@
 #define FINDING_BYTES 256u
 #define PDO_FIRST     0x1400u
 #define PDO_LAST      0x1BFFu
+#define CONSUMER      0x1016u
 
 /** A file being judged. Drives are alike: what has been said of one is not said again. */
 typedef struct {
@@ -123,8 +124,10 @@ static void judge_value(judge_t *self, const cia402_wish_t *wish, const eds_obje
     const bool is_low = object->low.is_there && !object->low.has_node && value < eds_shown(object, (uint32_t)object->low.value);
     const bool is_high =
         object->high.is_there && !object->high.has_node && value > eds_shown(object, (uint32_t)object->high.value);
+    const bool is_unlimited = object->low.value == 0 && object->high.value == 0; /* so some files write "none" */
     const char *key = key_of(wish);
-    if (key == NULL || (!is_low && !is_high)) { /* COB-IDs and mappings are heaved's own affair */
+    /* COB-IDs and mappings are heaved's own affair; limits of 1016h are those of its time, without the node above it */
+    if (key == NULL || (!is_low && !is_high) || is_unlimited || wish->index == CONSUMER) {
         return;
     }
     (void)snprintf(text, sizeof text, _("%04Xh:%02X (line %u) takes %s %lld, heaved sets %lld -> %s%s"), wish->index, wish->sub,
@@ -134,13 +137,19 @@ static void judge_value(judge_t *self, const cia402_wish_t *wish, const eds_obje
     say(self, level_of(self, wish), text);
 }
 
+/* It is what heaved would set. */
+static bool is_set_already(const cia402_wish_t *wish, const eds_object_t *object)
+{
+    const uint32_t bits = wish->bytes >= 4u ? UINT32_MAX : (1u << 8u * wish->bytes) - 1u;
+    const eds_number_t *holds = &object->fallback;
+    return wish->is_compared && holds->is_there && !holds->has_node && (((uint32_t)holds->value ^ wish->value) & bits) == 0;
+}
+
 static void judge_access(judge_t *self, const cia402_wish_t *wish, const eds_object_t *object)
 {
     char text[FINDING_BYTES];
-    const bool is_equal =
-        object->fallback.is_there && !object->fallback.has_node && ((uint32_t)object->fallback.value ^ wish->value) == 0;
     const uint8_t bytes = eds_bytes(object);
-    if (wish->is_written && !object->is_writable && !(wish->is_compared && is_equal)) {
+    if (wish->is_written && !object->is_writable && !is_set_already(wish, object)) {
         char holds[48] = "";
         if (object->fallback.is_there) {
             (void)snprintf(holds, sizeof holds, _(" and holds %lld"), (long long)object->fallback.value);
@@ -155,6 +164,10 @@ static void judge_access(judge_t *self, const cia402_wish_t *wish, const eds_obj
                        wish->index, wish->sub, object->line, wish->bytes,
                        wish->is_own ? remedy_of(self, wish) : _("the type in [cia402-startup]"));
         say(self, level_of(self, wish), text);
+    } else if (wish->is_compared && !object->is_readable) {
+        (void)snprintf(text, sizeof text, _("%04Xh:%02X (line %u) can only be written, heaved reads it -> %s"), wish->index,
+                       wish->sub, object->line, wish->is_own ? remedy_of(self, wish) : _("unchecked behind the item"));
+        say(self, level_of(self, wish), text);
     } else if (wish->is_written) {
         judge_value(self, wish, object);
     }
@@ -165,29 +178,65 @@ static void judge_wishes(judge_t *self, unsigned axis)
     cia402_wish_t wish = {0};
     while (cia402_next_wish(self->drives, axis, &wish)) {
         const eds_object_t *object = eds_find(self->eds, wish.index, wish.sub);
-        if (object == NULL) {
+        if (object == NULL && !eds_is_compact_pdo(self->eds, wish.index)) {
             judge_missing(self, &wish);
-        } else {
+        } else if (object != NULL) {
             judge_access(self, &wish, object);
         }
     }
 }
 
-/* What goes into the PDOs, unless it is there already. */
-static void judge_mapping(judge_t *self, unsigned axis)
+/* Why an object does not go into a PDO; NULL: it does.
+ * @param bits   that heaved maps
+ * @param is_sent by the drive */
+static const char *misfit_of(const eds_object_t *object, unsigned bits, bool is_sent)
+{
+    if (object == NULL) {
+        return _("is not in it");
+    }
+    if (!object->is_mappable) {
+        return _("cannot be mapped into a PDO");
+    }
+    if (8u * eds_bytes(object) != bits) {
+        return _("has another size than heaved maps");
+    }
+    if (!is_sent && !object->is_writable) {
+        return _("can only be read, and heaved commands it");
+    }
+    return is_sent && !object->is_readable ? _("can only be written, and heaved needs its value") : NULL;
+}
+
+/* Positions are below 0, too. */
+static bool has_wrong_sign(const eds_object_t *object)
+{
+    const bool is_signed = object->index == 0x6064 || object->index == 0x607A || object->index == 0x60C1;
+    return is_signed && eds_type_name(object)[0] != 'i';
+}
+
+/* An object that heaved maps into a PDO. */
+static void judge_entry(judge_t *self, uint32_t entry, bool is_sent, bool is_fixed)
 {
     char text[FINDING_BYTES];
+    const unsigned index = entry >> 16;
+    const unsigned sub_index = entry >> 8 & 0xFFu;
+    const eds_object_t *object = eds_find(self->eds, (uint16_t)index, (uint8_t)sub_index);
+    const char *misfit = misfit_of(object, entry & 0xFFu, is_sent);
+    if (misfit != NULL && !(is_fixed && object != NULL && !object->is_mappable)) { /* what is mapped already can be */
+        (void)snprintf(text, sizeof text, _("%04Xh:%02X %s -> another drive, or firmware"), index, sub_index, misfit);
+        say(self, DOCTOR_FAIL, text);
+    } else if (object != NULL && has_wrong_sign(object)) {
+        (void)snprintf(text, sizeof text, _("%04Xh:%02X (line %u) has no sign: heaved takes it for a number with one"), index,
+                       sub_index, object->line);
+        say(self, DOCTOR_WARN, text);
+    }
+}
+
+static void judge_mapping(judge_t *self, unsigned axis)
+{
     for (unsigned which = 0; which < CIA402_PDOS; which++) {
         const cia402_pdo_t pdo = cia402_pdo(self->drives, axis, which);
-        for (unsigned i = 0; i < pdo.entries && !pdo.is_fixed; i++) {
-            const uint32_t entry = pdo.entry[i];
-            const eds_object_t *object = eds_find(self->eds, (uint16_t)(entry >> 16), (uint8_t)(entry >> 8));
-            if (object == NULL || !object->is_mappable) {
-                (void)snprintf(text, sizeof text, _("%04Xh:%02X %s -> another drive, or firmware"), (unsigned)(entry >> 16),
-                               (unsigned)(entry >> 8 & 0xFFu),
-                               object == NULL ? _("is not in it") : _("cannot be mapped into a PDO"));
-                say(self, DOCTOR_FAIL, text);
-            }
+        for (unsigned i = 0; i < pdo.entries; i++) {
+            judge_entry(self, pdo.entry[i], which >= CIA402_ANSWER, pdo.is_fixed);
         }
     }
 }

@@ -40,10 +40,10 @@ static void check_item(config_source_t *self, const cia402_config_t *drives, con
         is_own = is_own || is_written_by_heaved(drives, axis, item);
     }
     if (is_own) {
-        config_source_error(self, line, "[%s] 0x%04X:%02u: heaved sets it itself; allowed: the keys of [cia402] for that",
+        config_source_error(self, line, "[%s] 0x%04X:%02X: heaved sets it itself; allowed: the keys of [cia402] for that",
                             section, item->index, item->sub);
     } else if (denied != NULL) {
-        config_source_error(self, line, "[%s] 0x%04X:%02u %s; allowed: other objects, or `is` to look", section, item->index,
+        config_source_error(self, line, "[%s] 0x%04X:%02X %s; allowed: other objects, or `is` to look", section, item->index,
                             item->sub, denied);
     }
 }

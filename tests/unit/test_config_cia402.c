@@ -11,6 +11,7 @@
 #include "platform/cia402_section.h"
 #include "config/config.h"
 #include "platform/load.h"
+#include "config/startup.h"
 #include "config/value.h"
 #include "canopen_drives.h"
 #include "inspect/report.h"
@@ -227,6 +228,26 @@ static void test_load_startup_list_of_a_drive_reaches_it_alone(void)
     TEST_ASSERT_TRUE(drives.axis[0].item[0].value == 50 && drives.axis[5].item[2].index == 0x2040);
 }
 
+/* Sub-indices are hexadecimal, as indices are, and are written back so. */
+static void test_load_startup_sub_indices_have_one_base(void)
+{
+    cia402_config_t drives;
+    char text[200];
+    strcat(m_text,
+           "\n[cia402-startup]\n0x2030:9 = 1 u8\n0x2030:0A = 1 u8\n0x2030:0x10 = 1 u8\n0x2030:FF = 1 u8\n0x2030:1f = 1 u8\n");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    static const uint8_t k_subs[] = {9, 10, 16, 255, 31};
+    for (unsigned i = 0; i < 5; i++) {
+        config_text_t written;
+        config_text_clear(&written);
+        TEST_ASSERT_EQUAL_UINT8(k_subs[i], drives.axis[0].item[i].sub);
+        config_startup_format(&drives.axis[0].item[i], &written);
+        snprintf(text, sizeof text, k_subs[i] < 10 ? "0x2030:%02X = 0x1 u8" : "0x2030:0x%02X = 0x1 u8", k_subs[i]);
+        TEST_ASSERT_EQUAL_STRING(text, written.data);
+    }
+}
+
 static void test_load_startup_lists_of_all_and_of_a_drive_may_be_full(void)
 {
     cia402_config_t drives;
@@ -279,7 +300,11 @@ static void test_load_startup_item_that_cannot_be_is_refused_at_its_line(void)
     refuse_item("0x2030 = 50 u16", "has no sub-index");
     refuse_item("2030:01 = 50 u16", "has no object such as");
     refuse_item("0x12030:01 = 50 u16", "has no object such as");
-    refuse_item("0x2030:256 = 50 u16", "has no sub-index from 0 to 255");
+    refuse_item("0x2030:256 = 50 u16", "has no sub-index from 00 to FF");
+    refuse_item("0x2030:0x100 = 50 u16", "has no sub-index from 00 to FF");
+    refuse_item("0x2030: = 50 u16", "has no sub-index from 00 to FF");
+    refuse_item("0x2030:10 = 50 u16", "has a sub-index that may be meant decimal");
+    refuse_item("0x2030:99 = 50 u16", "has a sub-index that may be meant decimal");
     refuse_item("0x2030:01 = 50", "is no object with value and type");
     refuse_item("0x2030:01 == 50 u16", "has no type that there is");
     refuse_item("0x2030:01 = 65536 u16", "has a value that its type does not hold");
@@ -790,6 +815,7 @@ int main(void)
     RUN_TEST(test_load_lists_and_signs_reach_their_drives);
     RUN_TEST(test_load_startup_list_reaches_every_drive_in_its_order);
     RUN_TEST(test_load_startup_list_of_a_drive_reaches_it_alone);
+    RUN_TEST(test_load_startup_sub_indices_have_one_base);
     RUN_TEST(test_load_startup_lists_of_all_and_of_a_drive_may_be_full);
     RUN_TEST(test_load_startup_list_of_a_drive_is_checked_as_that_of_all);
     RUN_TEST(test_load_startup_item_that_cannot_be_is_refused_at_its_line);

@@ -25,10 +25,11 @@ static char m_out[20000];
 static void put_object(unsigned index, unsigned sub, unsigned bytes, const char *access, const char *more)
 {
     static const unsigned k_types[] = {0, 5, 6, 0, 7};
+    const bool is_position = index == 0x6064 || index == 0x607A;
     char text[300];
     snprintf(text, sizeof text,
              "[%04X%s%s%.0X]\nParameterName=an object\nObjectType=0x7\nDataType=0x%04X\nAccessType=%s\nPDOMapping=1\n%s\n", index,
-             sub == 0 ? "" : "s", sub == 0 ? "" : "ub", sub, k_types[bytes], access, more);
+             sub == 0 ? "" : "s", sub == 0 ? "" : "ub", sub, is_position && bytes == 4 ? 4 : k_types[bytes], access, more);
     strcat(m_text, text);
 }
 
@@ -168,6 +169,108 @@ static void test_judge_object_that_can_only_be_read_has_to_hold_the_value(void)
     TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
 }
 
+/* -3 of an i8 and 0xFD of a u8 are the same. */
+static void test_judge_values_are_compared_as_the_drive_has_them(void)
+{
+    put_all(0x60C202, "const", 0, "DefaultValue=-3");
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+    put_all(0x60C202, "const", 0, "DefaultValue=0xFFFFFFFD");
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+}
+
+static void test_judge_limits_that_are_none(void)
+{
+    put_all(0x606500, "rw", 0, "LowLimit=0\nHighLimit=0");
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+    put_all(0x101601, "rw", 0, "LowLimit=0\nHighLimit=0xFFFF"); /* of the time: the node is above it */
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+}
+
+/* An array has the type of its entries, which then have none. */
+static void test_judge_types_of_entries_that_stand_in_their_array(void)
+{
+    put_all(0x101601, NULL, 0, "");
+    strcat(m_text, "[1016]\nParameterName=a\nObjectType=0x8\nDataType=0x7\nAccessType=rw\nSubNumber=2\n"
+                   "[1016sub0]\nParameterName=n\nAccessType=ro\n[1016sub1]\nParameterName=b\n");
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+    TEST_ASSERT_EQUAL_UINT8(1, eds_bytes(eds_find(&m_eds, 0x1016, 0)));
+    TEST_ASSERT_EQUAL_UINT8(4, eds_bytes(eds_find(&m_eds, 0x1016, 1)));
+    put_all(0x101601, NULL, 0, "");
+    strcat(m_text, "[1016]\nParameterName=a\nDataType=0x6\nAccessType=rw\nSubNumber=2\nObjectType=0x8\n"
+                   "[1016sub0]\nParameterName=n\nAccessType=ro\n[1016sub1]\nParameterName=b\n");
+    TEST_ASSERT_FALSE(judge());
+    expect("1016h:01");
+    expect("is no value of 4 bytes");
+}
+
+/* CompactPDO: the file leaves out what every PDO has. */
+static void test_judge_pdos_that_the_file_leaves_out(void)
+{
+    char text[sizeof m_text];
+    for (unsigned i = 0; i < 2; i++) {
+        put_all(0, NULL, 0, "");
+        strcpy(text, m_text);
+        char *device = strstr(text, "[DeviceInfo]\n") + strlen("[DeviceInfo]\n");
+        size_t used = (size_t)(device - text);
+        memcpy(m_text, text, used);
+        used += (size_t)sprintf(m_text + used, "CompactPDO=0x%X\nNrOfRXPDO=%u\nNrOfTXPDO=4\n", 1, i == 0 ? 4 : 0);
+        for (char *at = device; at != NULL && *at != '\0';) { /* without 1400h to 1BFFh */
+            char *next = strstr(at + 1, "\n[");
+            const bool is_pdo = at[0] == '[' && at[1] == '1' && at[2] >= '4' && strchr("468A", at[2]) != NULL;
+            const size_t length = next == NULL ? strlen(at) : (size_t)(next + 1 - at);
+            memcpy(m_text + used, at, is_pdo ? 0 : length);
+            used += is_pdo ? 0 : length;
+            at = next == NULL ? NULL : next + 1;
+        }
+        m_text[used] = '\0';
+        TEST_ASSERT_NULL(strstr(m_text, "[1400"));
+        TEST_ASSERT_EQUAL_MESSAGE(i == 0, judge(), m_out);
+    }
+    expect("1400h:01 is not in it");
+}
+
+/* What would not have gone into the PDOs, or not come out of them. */
+static void test_judge_what_is_mapped_has_its_size_sign_and_access(void)
+{
+    static const struct {
+        const char *section;
+        const char *was;
+        const char *is;
+        bool is_usable;
+        const char *says;
+    } k_rows[] = {{"[6041]", "DataType=0x0006", "DataType=0x0007", false, "6041h:00 has another size than heaved maps"},
+                  {"[6064]", "DataType=0x0004", "DataType=0x0003", false, "6064h:00 has another size than heaved maps"},
+                  {"[6064]", "ObjectType=0x7", "ObjectType=0x8", false, "6064h:00 is not in it"},
+                  {"[6041]", "AccessType=ro", "AccessType=wo", false, "6041h:00 can only be written, and heaved needs its value"},
+                  {"[607A]", "AccessType=rww", "AccessType=ro ", false, "607Ah:00 can only be read, and heaved commands it"},
+                  {"[6064]", "DataType=0x0004", "DataType=0x0007", true, "has no sign"}};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        put_all(0, NULL, 0, "");
+        char *at = strstr(strstr(m_text, k_rows[i].section), k_rows[i].was);
+        TEST_ASSERT_NOT_NULL(at);
+        memcpy(at, k_rows[i].is, strlen(k_rows[i].is));
+        TEST_ASSERT_EQUAL_MESSAGE(k_rows[i].is_usable, judge(), m_out);
+        expect(k_rows[i].says);
+    }
+    put_all(0x606500, "wo", 0, "");
+    TEST_ASSERT_FALSE(judge());
+    expect("can only be written, heaved reads it");
+}
+
+static void test_read_long_lines_are_comments_or_wrong(void)
+{
+    char comment[4000];
+    memset(comment, 'x', sizeof comment);
+    comment[0] = ';';
+    strcpy(comment + sizeof comment - 3, "=\n");
+    memmove(m_text + sizeof comment - 1, m_text, strlen(m_text) + 1);
+    memcpy(m_text, comment, sizeof comment - 1);
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+    m_text[0] = 'x';
+    TEST_ASSERT_FALSE(read_text());
+    expect("a.eds:1: ");
+}
+
 static void test_judge_value_outside_the_limits_names_key_and_line(void)
 {
     char line[60];
@@ -276,6 +379,12 @@ int main(void)
     RUN_TEST(test_judge_each_object_that_is_missing_is_named);
     RUN_TEST(test_judge_guard_that_is_missing_may_be_allowed);
     RUN_TEST(test_judge_object_that_can_only_be_read_has_to_hold_the_value);
+    RUN_TEST(test_judge_values_are_compared_as_the_drive_has_them);
+    RUN_TEST(test_judge_limits_that_are_none);
+    RUN_TEST(test_judge_types_of_entries_that_stand_in_their_array);
+    RUN_TEST(test_judge_pdos_that_the_file_leaves_out);
+    RUN_TEST(test_judge_what_is_mapped_has_its_size_sign_and_access);
+    RUN_TEST(test_read_long_lines_are_comments_or_wrong);
     RUN_TEST(test_judge_value_outside_the_limits_names_key_and_line);
     RUN_TEST(test_judge_other_size_is_found);
     RUN_TEST(test_judge_what_cannot_be_mapped_is_found);
