@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define INDEX_MAX 0xFFFFu
+#define INDEX_MAX    0xFFFFu
+#define LISTED_FIRST 0x2000u
 
 /* The next word of a line. False where there is none, or it is too long. */
 bool fault_next_word(const char **at, char word[FAULT_WORD_MAX])
@@ -63,8 +64,9 @@ bool fault_read_object(const char *word, uint32_t *out, char why[FAULT_WHY_MAX])
     }
     objects_t any;
     const uint32_t identity[4] = {0};
+    const bool may_be_listed = index >= LISTED_FIRST; /* in a start-up list, which is not known here */
     objects_start(&any, 1, identity, true);
-    if (objects_find(&any, (uint16_t)index, (uint8_t)sub) == NULL) {
+    if (!may_be_listed && objects_find(&any, (uint16_t)index, (uint8_t)sub) == NULL) {
         (void)snprintf(why, FAULT_WHY_MAX, "these drives have no object %04lX:%lX", index, sub);
         return false;
     }

@@ -127,13 +127,24 @@ static void put_maps(node_t *self, uint16_t mappings, const cia402_maps_t *maps)
     }
 }
 
+/* An object of the maker, or what one of the usual ones holds from the factory. */
+static void add_own(objects_t *od, const object_t *own)
+{
+    object_t *usual = objects_find(od, own->index, own->sub);
+    if (usual == NULL) {
+        objects_add(od, *own);
+    } else if (own->is_read_only) {
+        usual->value = usual->fallback = own->fallback;
+    }
+}
+
 static void start_axis(node_t *self, uint64_t now_us)
 {
     const objects_t before = self->drive.od;
     self->now_us = now_us;
     objects_start(&self->drive.od, self->number, self->identity, self->head == NULL);
     for (unsigned i = 0; i < self->owns; i++) {
-        objects_add(&self->drive.od, self->own[i]);
+        add_own(&self->drive.od, &self->own[i]);
     }
     put_maps(self, 0x1600, &self->commands);
     put_maps(self, 0x1A00, &self->answers);

@@ -51,7 +51,7 @@ void objects_add(objects_t *self, object_t row)
     }
     row.value = row.fallback;
     self->row[self->count++] = row;
-    self->place[place] = (uint8_t)self->count;
+    self->place[place] = (uint16_t)self->count;
 }
 
 /* As many drives come: valid and event-driven, until somebody configures them. */

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define OBJECTS_MAX   240u
+#define OBJECTS_MAX   320u
 #define OBJECT_PLACES 512u /* a power of two above it */
 #define OBJECT_PDOS   4u
 #define OBJECT_AXES   4u
@@ -49,7 +49,7 @@ typedef struct {
 typedef struct objects {
     uint32_t count;
     object_t row[OBJECTS_MAX];
-    uint8_t place[OBJECT_PLACES];      /**< where to look for a row: its number from 1; 0 = nothing */
+    uint16_t place[OBJECT_PLACES];     /**< where to look for a row: its number from 1; 0 = nothing */
     struct objects *axis[OBJECT_AXES]; /**< of the node: what a PDO may have in it; NULL = there is none */
 } objects_t;
 

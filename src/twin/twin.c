@@ -144,6 +144,21 @@ static void start_frames(twin_t *self, const config_t *config, const twin_settin
     }
 }
 
+/* The objects of a start-up list: such drives have them. One that is written holds something else before. */
+static void add_objects(twin_t *self, unsigned k, const cia402_axis_config_t *axis)
+{
+    for (unsigned i = 0; i < axis->items; i++) {
+        const cia402_item_t *item = &axis->item[i];
+        self->own[k][i] = (object_t){.index = item->index,
+                                     .sub = item->sub,
+                                     .bytes = item->bytes,
+                                     .fallback = item->is_written ? (item->value == 0 ? 1u : 0u) : item->value,
+                                     .is_read_only = !item->is_written};
+    }
+    self->node[k].own = self->own[k];
+    self->node[k].owns = axis->items;
+}
+
 /* Axes of one node, in the order that they have there. */
 static void join_axes(twin_t *self, const cia402_config_t *drives)
 {
@@ -204,6 +219,7 @@ void twin_start(twin_t *self, const config_t *config, const twin_settings_t *set
         node->commands = drives.commands;
         node->answers = drives.answers;
         node->are_maps_fixed = drives.are_maps_fixed;
+        add_objects(self, k, axis);
         couple(self, config, settings, &axis->scale, k);
     }
     join_axes(self, &drives);

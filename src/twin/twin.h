@@ -74,9 +74,10 @@ typedef struct {
     unsigned drives;
     unsigned cylinders;
     canraw_map_t frame_map;
-    frame_drive_t frame[DRIVES_MAX]; /**< of TWIN_DRIVES_FRAMES */
-    node_t node[DRIVES_MAX];         /**< the motors are here, whatever the bus */
-    modbus_side_t modbus;            /**< drives, and a board of relays, on Modbus */
+    frame_drive_t frame[DRIVES_MAX];            /**< of TWIN_DRIVES_FRAMES */
+    object_t own[DRIVES_MAX][CIA402_ITEMS_MAX]; /**< what their start-up lists name */
+    node_t node[DRIVES_MAX];                    /**< the motors are here, whatever the bus */
+    modbus_side_t modbus;                       /**< drives, and a board of relays, on Modbus */
     uint8_t leg_of[DRIVES_MAX];
     double zero[DRIVES_MAX];     /**< raw counts of a drive at 0 u */
     double per_unit[DRIVES_MAX]; /**< raw counts per u as it really is */

@@ -485,6 +485,11 @@ bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT
         return twin->bus.act(twin->bus.ctx, row->bus, (uint32_t)self->number[0], why, FAULT_WHY_MAX);
     }
     for (unsigned k = 0; k < twin->drives; k++) {
+        if ((self->drives >> k & 1u) != 0 && self->object != 0 && object_of(twin, k, self) == NULL) {
+            (void)snprintf(why, FAULT_WHY_MAX, "drive %u has no object %04X:%X; it has those of its start-up list", k + 1u,
+                           (unsigned)self->object >> 8, (unsigned)self->object & 0xFFu);
+            return false;
+        }
         if ((self->drives >> k & 1u) != 0) {
             act_on(row, twin->kind)(twin, k, self, now_us);
         }

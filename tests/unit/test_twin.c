@@ -480,7 +480,7 @@ static void test_faults_wrong_lines_say_what_is_wrong(void)
                                              {"emcy 2 x", "x is no number"},
                                              {"emcy 2 70000", "from 0 to 65535"},
                                              {"sdo-mute 2 zz", "zz is no object"},
-                                             {"sdo-mute 2 5FFF:1", "no object 5FFF:1"},
+                                             {"sdo-mute 2 1FFF:1", "no object 1FFF:1"},
                                              {"node 2 300", "from 0 to 127"},
                                              {"bus-off now", "written as: bus-off"}};
     for (unsigned i = 0; i < sizeof k_lines / sizeof k_lines[0]; i++) {
@@ -552,6 +552,36 @@ static void test_mend_gives_objects_and_nodes_back_what_they_were(void)
     TEST_ASSERT_EQUAL(4, m_twin.node[3].number);
     run(1000000);
     TEST_ASSERT_NOT_NULL(last(0x704));
+}
+
+/* Such drives have what their start-up list names; they do not hold it before it is written, but for what is only looked at. */
+static void test_objects_of_the_start_up_list_are_there(void)
+{
+    char why[FAULT_WHY_MAX] = "";
+    fault_t fault;
+    m_config.cia402.startup =
+        (config_startup_t){.count = 4,
+                           .item = {{.index = 0x2030, .sub = 1, .bytes = 2, .value = 50, .is_written = true},
+                                    {.index = 0x2031, .bytes = 1, .value = 0, .is_written = true},
+                                    {.index = 0x2032, .bytes = 4, .value = 77},
+                                    {.index = 0x6502, .bytes = 4, .value = 0x80}}};
+    m_config.cia402.drive_startup[2] =
+        (config_startup_t){.count = 1, .item = {{.index = 0x2040, .bytes = 4, .value = 7, .is_written = true}}};
+    start();
+    TEST_ASSERT_EQUAL_UINT32(0, ask_read(1, 0x2030, 1));
+    TEST_ASSERT_EQUAL_UINT32(1, ask_read(1, 0x2031, 0));
+    TEST_ASSERT_EQUAL_UINT32(77, ask_read(1, 0x2032, 0));
+    TEST_ASSERT_EQUAL_UINT32(0x80, ask_read(1, 0x6502, 0));
+    TEST_ASSERT_EQUAL_HEX32(0, ask_write(1, 0x2030, 1, 2, 50));
+    TEST_ASSERT_EQUAL_UINT32(50, ask_read(1, 0x2030, 1));
+    TEST_ASSERT_EQUAL_HEX32(OBJECT_READ_ONLY, ask_write(1, 0x2032, 0, 4, 1));
+    TEST_ASSERT_EQUAL_HEX32(0, ask_write(3, 0x2040, 0, 4, 7));
+    TEST_ASSERT_EQUAL_HEX32(OBJECT_MISSING, ask_write(1, 0x2040, 0, 4, 7));
+    act("object 1 2030:1 9");
+    TEST_ASSERT_EQUAL_UINT32(9, ask_read(1, 0x2030, 1));
+    TEST_ASSERT_TRUE_MESSAGE(fault_read(&fault, "object all 2040 9", m_twin.drives, why), why);
+    TEST_ASSERT_FALSE(fault_do(&fault, &m_twin, m_now_us, why));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(why, "drive 1 has no object 2040:0; it has those of its start-up list"), why);
 }
 
 /* What the drive would show meanwhile is there again afterwards. */
@@ -801,6 +831,7 @@ int main(void)
     RUN_TEST(test_faults_every_line_of_the_table_can_be_read_and_done);
     RUN_TEST(test_faults_wrong_lines_say_what_is_wrong);
     RUN_TEST(test_faults_of_a_drive_show_on_the_bus);
+    RUN_TEST(test_objects_of_the_start_up_list_are_there);
     RUN_TEST(test_object_that_the_drive_shows_is_held_until_it_is_mended);
     RUN_TEST(test_mend_gives_objects_and_nodes_back_what_they_were);
     RUN_TEST(test_deaf_drive_waits_for_nothing);
