@@ -42,15 +42,13 @@ hv_status_t modbus_drive_init(modbus_drive_t *self, const modbus_drive_map_t *ma
     return HV_OK;
 }
 
-static bool is_offline(const modbus_drive_t *self, unsigned k)
-{
-    return modbus_drive_axis_state(&self->axis[k]) == DRIVE_OFFLINE;
-}
-
-static bool is_any_online(const modbus_drive_t *self)
+/* One that refuses what it is asked, or whose answers are damaged, is no sign of a lost line. */
+static bool is_any_answering(const modbus_drive_t *self)
 {
     for (unsigned k = 0; k < self->map->axes; k++) {
-        if (!is_offline(self, k)) {
+        const uint32_t trouble = self->axis[k].trouble;
+        const bool is_strange = trouble == MODBUS_DRIVE_EXCEPTION || trouble == MODBUS_DRIVE_DAMAGED;
+        if (self->axis[k].phase != MODBUS_DRIVE_WAITING || is_strange) {
             return true;
         }
     }
@@ -204,13 +202,13 @@ static hv_status_t drive_poll(void *ctx, uint64_t now_us, drive_feedback_t feedb
         submit_write(self, k);
         submit_read(self, k);
     }
-    return is_any_online(self) ? HV_OK : HV_ERR_IO;
+    return is_any_answering(self) ? HV_OK : HV_ERR_IO;
 }
 
 static hv_status_t drive_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
 {
     modbus_drive_t *self = ctx;
-    if (!is_any_online(self)) {
+    if (!is_any_answering(self)) {
         return HV_ERR_IO;
     }
     const uint64_t passed_us = self->sent_us != 0 ? now_us - self->sent_us : 0;
@@ -244,7 +242,7 @@ static hv_status_t judge(const modbus_drive_t *self, unsigned from, unsigned end
 static hv_status_t drive_request(void *ctx, drives_request_t request)
 {
     modbus_drive_t *self = ctx;
-    if (!is_any_online(self)) {
+    if (!is_any_answering(self)) {
         return HV_ERR_IO;
     }
     const hv_status_t status = judge(self, 0, self->map->axes, request);
@@ -263,7 +261,7 @@ static hv_status_t drive_request(void *ctx, drives_request_t request)
 static hv_status_t drive_request_one(void *ctx, uint8_t k, drives_request_t request)
 {
     modbus_drive_t *self = ctx;
-    if (!is_any_online(self)) {
+    if (!is_any_answering(self)) {
         return HV_ERR_IO;
     }
     const hv_status_t status = judge(self, k, k + 1u, request);

@@ -89,8 +89,18 @@ static const char *trouble_text(uint32_t trouble)
 static const char *exception_text(uint8_t exception)
 {
     static const char *const k_texts[] = {
-        "another code",       "function not supported", "no such register", "value not allowed",
-        "it failed to do so", "it needs time",          "it is busy",
+        "another code",
+        "function not supported",
+        "no such register",
+        "value not allowed",
+        "it failed to do so",
+        "it needs time",
+        "it is busy",
+        "it cannot do so now",
+        "its memory is damaged",
+        "another code",
+        "the gateway in between has no path to it",
+        "the gateway in between gets no answer from it",
     };
     return k_texts[exception < sizeof k_texts / sizeof k_texts[0] ? exception : 0];
 }

@@ -235,6 +235,29 @@ static void test_drive_whose_counter_stands_still_is_lost_and_stays_so(void)
     TEST_ASSERT_TRUE(feedback[4].state != DRIVE_OFFLINE);
 }
 
+/* All counters stand still, or all answers are other ones: the drives are there, so the bus is not lost. Silence is. */
+static void test_all_that_answer_strangely_are_no_lost_bus(void)
+{
+    for (unsigned i = 0; i < 3; i++) {
+        hv_status_t status = HV_OK;
+        setUp();
+        open_sealed();
+        enable();
+        for (unsigned k = 0; k < AXES; k++) {
+            slave.twin[k].is_stuck = i == 0;
+            slave.twin[k].is_mute = i == 2;
+        }
+        map.position_reply.data[0] ^= i == 1 ? 0x10 : 0; /* they send something else than heaved waits for */
+        for (unsigned n = 0; n < 4u * ((unsigned)map.offline_periods + 2u); n++) {
+            status = cycle();
+        }
+        TEST_ASSERT_EQUAL(i == 2 ? HV_ERR_IO : HV_OK, status);
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[k].state);
+        }
+    }
+}
+
 static void test_fault_of_a_drive_has_the_code_that_it_tells(void)
 {
     map = canraw_maps_rich();
@@ -1593,6 +1616,7 @@ int main(void)
     RUN_TEST(test_sealed_frame_that_finds_no_room_is_no_gap);
     RUN_TEST(test_reply_with_a_wrong_check_byte_is_not_believed);
     RUN_TEST(test_drive_whose_counter_stands_still_is_lost_and_stays_so);
+    RUN_TEST(test_all_that_answer_strangely_are_no_lost_bus);
     RUN_TEST(test_fault_of_a_drive_has_the_code_that_it_tells);
     RUN_TEST(test_frames_of_the_plain_dialect_byte_for_byte);
     RUN_TEST(test_setpoint_at_full_stroke_byte_for_byte);

@@ -233,7 +233,7 @@ static void test_startup_wrong_value_is_refused_by_name_and_taken_when_mended(vo
     TEST_ASSERT_EQUAL_STRING("a register holds another value", report_of(2).trouble);
     TEST_ASSERT_EQUAL_HEX32(21 << 8, report_of(2).object);
     map.item[0].value = 0x0203;
-    TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_DISABLE));
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     await(DRIVE_DISABLED, 3000);
 }
 
@@ -296,15 +296,60 @@ static void test_startup_without_anything_to_switch_off_or_to_write(void)
     TEST_ASSERT_EQUAL_UINT16(0, modbus_drives_register(&slave, 3, 20));
 }
 
-static void test_startup_exception_that_is_none_of_the_known(void)
+static void test_startup_exceptions_have_words(void)
 {
-    static const sim_modbus_fault_t k_plan[] = {{SIM_MODBUS_EXCEPTION, 1, 11}};
-    slave.line[4].plan = k_plan;
-    slave.line[4].planned = 1;
-    cycles(50);
-    TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_EXCEPTION, feedback[4].fault_code);
-    TEST_ASSERT_EQUAL_STRING("another code", report_of(4).detail);
-    TEST_ASSERT_EQUAL_UINT32(11, report_of(4).detail_code);
+    static const struct {
+        uint8_t code;
+        const char *words;
+    } k_rows[] = {{4, "it failed to do so"},
+                  {9, "another code"},
+                  {10, "the gateway in between has no path to it"},
+                  {11, "the gateway in between gets no answer from it"},
+                  {12, "another code"},
+                  {255, "another code"}};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        const sim_modbus_fault_t plan[] = {{SIM_MODBUS_EXCEPTION, 1, k_rows[i].code}};
+        setUp();
+        slave.line[4].plan = plan;
+        slave.line[4].planned = 1;
+        cycles(50);
+        TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_EXCEPTION, feedback[4].fault_code);
+        TEST_ASSERT_EQUAL_STRING(k_rows[i].words, report_of(4).detail);
+        TEST_ASSERT_EQUAL_UINT32(k_rows[i].code, report_of(4).detail_code);
+    }
+}
+
+/* Drives that refuse, or that nobody understands, are no lost line: each of them says what is wrong. */
+static void test_all_that_answer_strangely_are_no_lost_line(void)
+{
+    static const struct {
+        sim_modbus_fault_kind_t kind;
+        hv_status_t status;
+        uint32_t code;
+    } k_rows[] = {{SIM_MODBUS_EXCEPTION, HV_OK, MODBUS_DRIVE_EXCEPTION},
+                  {SIM_MODBUS_DAMAGED, HV_OK, MODBUS_DRIVE_DAMAGED},
+                  {SIM_MODBUS_SILENT, HV_ERR_IO, MODBUS_DRIVE_NO_ANSWER}};
+    static sim_modbus_fault_t plan[3000];
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        hv_status_t status = HV_OK;
+        setUp();
+        await(DRIVE_DISABLED, 100);
+        for (uint32_t n = 0; n < sizeof plan / sizeof plan[0]; n++) { /* from here on all of them */
+            plan[n] = (sim_modbus_fault_t){k_rows[i].kind, n + 1u, 4};
+        }
+        for (unsigned k = 0; k < AXES; k++) {
+            slave.line[k].plan = plan;
+            slave.line[k].planned = sizeof plan / sizeof plan[0];
+        }
+        for (unsigned n = 0; n < 600; n++) {
+            status = cycle();
+        }
+        TEST_ASSERT_EQUAL(k_rows[i].status, status);
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[k].state);
+            TEST_ASSERT_EQUAL_HEX32(k_rows[i].code, feedback[k].fault_code);
+        }
+    }
 }
 
 static hal_modbus_ops_t odd_ops;
@@ -1622,7 +1667,8 @@ int main(void)
     RUN_TEST(test_startup_names_the_register_it_is_at);
     RUN_TEST(test_startup_refused_drive_begins_again_at_once_by_a_reset_and_by_nothing_else);
     RUN_TEST(test_startup_without_anything_to_switch_off_or_to_write);
-    RUN_TEST(test_startup_exception_that_is_none_of_the_known);
+    RUN_TEST(test_startup_exceptions_have_words);
+    RUN_TEST(test_all_that_answer_strangely_are_no_lost_line);
     RUN_TEST(test_answers_of_another_length_are_damaged);
     RUN_TEST(test_startup_drive_that_comes_late_is_found);
     RUN_TEST(test_startup_torque_off_that_was_refused_is_tried_again);
