@@ -15,6 +15,7 @@
 #define PDO_FIRST     0x1400u
 #define PDO_LAST      0x1BFFu
 #define CONSUMER      0x1016u
+#define TYPE_REAL32   8u
 
 /** A file being judged. Drives are alike: what has been said of one is not said again. */
 typedef struct {
@@ -148,7 +149,7 @@ static bool is_set_already(const cia402_wish_t *wish, const eds_object_t *object
 static void judge_access(judge_t *self, const cia402_wish_t *wish, const eds_object_t *object)
 {
     char text[FINDING_BYTES];
-    const uint8_t bytes = eds_bytes(object);
+    const uint8_t bytes = object->type == TYPE_REAL32 ? 4 : eds_bytes(object); /* a list has the bits of such a number */
     if (wish->is_written && !object->is_writable && !is_set_already(wish, object)) {
         char holds[48] = "";
         if (object->fallback.is_there) {

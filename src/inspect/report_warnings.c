@@ -176,6 +176,53 @@ static void warn_watchdogs(report_t *self)
 }
 
 /* What is meant here and forgotten there: nothing is wrong with it. */
+/* Manuals number holding registers from 40001, and input registers from 30001. */
+static bool is_of_manual(const config_t *config, unsigned address, bool is_read)
+{
+    const unsigned first = is_read && config->modbus.read == CONFIG_READ_INPUT ? 30001u : 40001u;
+    return address >= first && address < first + 9999u;
+}
+
+static void warn_register(report_t *self, const char *key, unsigned address, bool is_read)
+{
+    config_text_t text;
+    if (is_of_manual(self->config, address, is_read)) {
+        config_text_clear(&text);
+        config_text_add(&text,
+                        _("[modbus] %s has register %u: if a manual calls it so, it is %u here; on the wire they count from 0"),
+                        key, address, (address - 1u) % 10000u);
+        warn(self, text.data);
+    }
+}
+
+static void warn_registers(report_t *self)
+{
+    const config_modbus_t *modbus = &self->config->modbus;
+    const struct {
+        const char *key;
+        const modbus_drive_blocks_t *blocks;
+    } k_blocks[] = {{"setpoint", &modbus->setpoint}, {"feedback", &modbus->feedback}, {"enable", &modbus->enable},
+                    {"disable", &modbus->disable},   {"stop", &modbus->stop},         {"reset", &modbus->reset},
+                    {"home", &modbus->home}};
+    const struct {
+        const char *key;
+        const config_items_t *items;
+    } k_items[] = {{"startup", &modbus->startup}, {"drive_timeout", &modbus->drive_timeout}};
+    if (self->config->drives != CONFIG_DRIVES_MODBUS_TCP && self->config->drives != CONFIG_DRIVES_MODBUS_RTU) {
+        return;
+    }
+    for (unsigned i = 0; i < sizeof k_blocks / sizeof k_blocks[0]; i++) {
+        for (unsigned n = 0; n < k_blocks[i].blocks->count; n++) {
+            warn_register(self, k_blocks[i].key, k_blocks[i].blocks->block[n].address, k_blocks[i].blocks == &modbus->feedback);
+        }
+    }
+    for (unsigned i = 0; i < sizeof k_items / sizeof k_items[0]; i++) {
+        for (unsigned n = 0; n < k_items[i].items->count; n++) {
+            warn_register(self, k_items[i].key, k_items[i].items->item[n].address, false);
+        }
+    }
+}
+
 static void write_notes(const report_t *self)
 {
     const config_t *config = self->config;
@@ -278,5 +325,6 @@ void report_write_warnings(report_t *self)
     }
     warn_profile_lag(self);
     warn_watchdogs(self);
+    warn_registers(self);
     write_notes(self);
 }

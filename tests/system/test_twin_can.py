@@ -212,6 +212,10 @@ class PresetBench(WithTwin):
         for key, value in (("interface = can0", "interface = vcan0"), ("engage = manual", "engage = manual\nlate_hold_cycles = 0"), ("port = 9800", f"port = {self.port}")):
             assert text.count(f"{key}\n") == 1, key
             text = text.replace(f"{key}\n", f"{value}\n")
+        if "accept_without" in text:
+            run = self.heaved("--config", preset, "--check")
+            assert run.returncode == 78 and run.stderr.count("\n") == 1 and "stop_confirmed = yes where somebody has tried it" in run.stderr, run.stderr
+            text = text.replace("accept_without", "stop_confirmed = yes\naccept_without")
         self.config.write_text(f"{in_a_hurry(text)}\n[control]\nsocket = {self.socket}\n", encoding="utf-8")
 
 

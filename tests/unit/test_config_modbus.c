@@ -6,6 +6,7 @@
 
 #include "platform/load.h"
 #include "platform/modbus_section.h"
+#include "inspect/report.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -250,9 +251,38 @@ static void test_report_tells_the_rate(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "500.0 mm/s of a cylinder"), text);
 }
 
+static bool is_warned(const char *warning)
+{
+    static char text[40000];
+    FILE *file = tmpfile();
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
+    (void)report_write(&m_config, 1, file);
+    rewind(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    (void)fclose(file);
+    return strstr(text, warning) != NULL;
+}
+
+/* 40257 of a manual is 256 on the wire. */
+static void test_report_warns_of_numbers_of_manuals(void)
+{
+    TEST_ASSERT_FALSE(is_warned("if a manual calls it so"));
+    put("feedback = 0x0100", "feedback = 40257");
+    TEST_ASSERT_TRUE(is_warned("warning: [modbus] feedback has register 40257: if a manual calls it so, it is 256 here"));
+    setUp();
+    put("feedback = 0x0100", "feedback = 30257");
+    TEST_ASSERT_FALSE(is_warned("if a manual calls it so")); /* holding registers are read here */
+    put("[modbus]\n", "[modbus]\nread = input\n");
+    TEST_ASSERT_TRUE(is_warned("[modbus] feedback has register 30257: if a manual calls it so, it is 256 here"));
+    setUp();
+    put("drive_timeout = 0x0300", "drive_timeout = 40001");
+    TEST_ASSERT_TRUE(is_warned("[modbus] drive_timeout has register 40001: if a manual calls it so, it is 0 here"));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_report_warns_of_numbers_of_manuals);
     RUN_TEST(test_preset_is_the_map_that_it_says);
     RUN_TEST(test_serial_line_is_as_slow_as_its_bytes);
     RUN_TEST(test_dump_reads_back_as_the_same);

@@ -230,6 +230,19 @@ static void test_judge_pdos_that_the_file_leaves_out(void)
 }
 
 /* What would not have gone into the PDOs, or not come out of them. */
+/* A fraction of a drive is set by its bits. */
+static void test_judge_fraction_of_a_start_up_list(void)
+{
+    m_config.cia402.startup = (config_startup_t){
+        .count = 1, .item = {{.index = 0x21F5, .bytes = 4, .value = 0x41A00000, .is_written = true, .is_checked = true}}};
+    put_all(0, NULL, 0, "");
+    strcat(m_text, "[21F5]\nParameterName=a\nObjectType=0x7\nDataType=0x0008\nAccessType=rw\n");
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+    m_config.cia402.startup.item[0].bytes = 2;
+    TEST_ASSERT_FALSE(judge());
+    expect("21F5h:00");
+}
+
 static void test_judge_what_is_mapped_has_its_size_sign_and_access(void)
 {
     static const struct {
@@ -383,6 +396,7 @@ int main(void)
     RUN_TEST(test_judge_limits_that_are_none);
     RUN_TEST(test_judge_types_of_entries_that_stand_in_their_array);
     RUN_TEST(test_judge_pdos_that_the_file_leaves_out);
+    RUN_TEST(test_judge_fraction_of_a_start_up_list);
     RUN_TEST(test_judge_what_is_mapped_has_its_size_sign_and_access);
     RUN_TEST(test_read_long_lines_are_comments_or_wrong);
     RUN_TEST(test_judge_value_outside_the_limits_names_key_and_line);
