@@ -13,17 +13,31 @@
 #define RESTART_US      500000u /* between attempts to restart the bus */
 #define FRAMES_PER_POLL 1024u   /* also of a storm of error frames: what waits behind it is ours */
 
+static bool is_any_online(const canraw_t *self)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if (self->axis[k].is_online) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* One that sends frames that are no answers, such as with a wrong check byte, is no sign of a lost bus. */
 static bool is_any_heard(const canraw_t *self)
 {
     const uint64_t silent_us = (uint64_t)self->map->offline_periods * self->map->period_us;
     for (unsigned k = 0; k < self->map->axes; k++) {
-        const canraw_axis_t *axis = &self->axis[k];
-        if (axis->is_online || (axis->heard_us != 0 && self->now_us - axis->heard_us <= silent_us)) {
+        if (self->axis[k].heard_us != 0 && self->now_us - self->axis[k].heard_us <= silent_us) {
             return true;
         }
     }
     return false;
+}
+
+static bool is_bus_lost(const canraw_t *self)
+{
+    return self->is_gone || !(is_any_online(self) || is_any_heard(self));
 }
 
 static void lose_all(canraw_t *self)
@@ -295,15 +309,15 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     if (may_speak && now_us - self->query_us >= 2u * (uint64_t)self->map->period_us) {
         send_queries(self);
     }
-    return self->is_gone || !is_any_heard(self) ? HV_ERR_IO : HV_OK;
+    return is_bus_lost(self) ? HV_ERR_IO : HV_OK;
 }
 
 static hv_status_t canraw_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
 {
     canraw_t *self = ctx;
     (void)now_us; /* that of the poll before */
-    if (self->is_gone || !is_any_heard(self)) {
-        return HV_ERR_IO;
+    if (self->is_gone || !is_any_online(self)) { /* nothing to send; poll asks */
+        return is_bus_lost(self) ? HV_ERR_IO : HV_OK;
     }
     if (!self->is_due) {
         return HV_OK;
