@@ -224,7 +224,7 @@ static hv_status_t can_send(void *ctx, const can_frame_t *frame)
     if (!has_interface(self)) {
         return HV_ERR_IO;
     }
-    if (!apply_plan(self->bus, &tx) || self->tx_count == SIM_CAN_TX_FRAMES) {
+    if (!apply_plan(self->bus, &tx) || self->tx_count >= self->room) {
         return HV_ERR_AGAIN;
     }
     self->tx[(self->tx_first + self->tx_count) % SIM_CAN_TX_FRAMES] = tx;
@@ -294,6 +294,7 @@ hv_status_t sim_can_open(sim_can_t *self, sim_can_bus_t *bus, const hal_can_filt
     memset(self, 0, sizeof *self);
     self->bus = bus;
     self->is_plugged = true;
+    self->room = SIM_CAN_TX_FRAMES;
     self->state = HAL_CAN_ACTIVE;
     self->filters = filters;
     for (uint32_t i = 0; i < filters; i++) {

@@ -55,7 +55,7 @@ typedef struct {
     uint32_t frames;  /**< frames that went over the wire */
 } sim_can_bus_t;
 
-/** A controller; private but for lost. */
+/** A controller; private but for lost and room. */
 typedef struct sim_can {
     sim_can_bus_t *bus;
     hal_can_filter_t filter[SIM_CAN_FILTERS_MAX];
@@ -66,6 +66,7 @@ typedef struct sim_can {
     sim_can_rx_t rx[SIM_CAN_RX_FRAMES];
     uint32_t rx_first;
     uint32_t rx_count;
+    uint32_t room; /**< frames that the send queue takes, [1, SIM_CAN_TX_FRAMES]; after sim_can_open() all of them */
     uint32_t lost; /**< received frames for which there was no room */
     bool is_overrun;
     bool is_plugged;

@@ -366,12 +366,11 @@ typedef struct {
     bool is_begun;  /* a poll has processed the request that led here */
     bool is_homing; /* the goal is homing, else enabled */
     bool is_homing_asked;
-    bool is_gone;          /* the bus does not work */
-    bool is_due;           /* a period has begun, its SYNC has not gone out */
-    bool is_open;          /* SYNC has gone out, the set-points have not */
-    bool was_period_begin; /* in the last poll */
-    bool is_free;          /* all frames sent were seen on the wire */
-    bool is_refused;       /* the bus did not accept the last SYNC, or some of the last set-points: its queue was full */
+    bool is_gone;    /* the bus does not work */
+    bool is_due;     /* a period has begun, its SYNC has not gone out */
+    bool is_open;    /* SYNC has gone out, the set-points have not */
+    bool is_free;    /* all frames sent were seen on the wire */
+    bool is_refused; /* the bus did not accept the last SYNC, or some of the last set-points: its queue was full */
     bool has_time;
     bool is_preop_due; /* NMT pre-operational has to be sent to all nodes */
     canpassive_t passive;

@@ -238,10 +238,11 @@ static void test_in_the_middle_of_bringing_up_nobody_is_enabled(void)
 {
     canopen_drives_power(&twin, 4, false);
     start();
-    for (unsigned i = 0; i < 5000 && feedback[0].state != DRIVE_DISABLED; i++) {
+    for (unsigned i = 0; i < 5000 && (feedback[0].state != DRIVE_DISABLED || feedback[AXES - 1].state != DRIVE_DISABLED); i++) {
         cycles(1);
     }
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[0].state);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[AXES - 1].state);
     say_row(3);
     cycles(1);
     for (unsigned k = 0; k < AXES; k++) {
