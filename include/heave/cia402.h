@@ -283,7 +283,6 @@ typedef struct {
     uint8_t changes;         /* consecutive answers with an additional one that showed a change before them, saturates */
     bool has_extra;          /* an additional answer came since the last awaited one, and showed another statusword */
     bool has_short_answer;   /* a TPDO since the last whole answer was too short */
-    bool is_reset_asked;     /* the operator resets; a fault may keep the drive from becoming operational */
     bool hides_mode;         /* shows no mode in 6061h without torque */
     uint16_t plain_word;     /* statusword of the last awaited answer */
     bool is_reset_done;
@@ -326,6 +325,7 @@ typedef struct {
     uint16_t word;
     uint8_t word_syncs;      /* since it changed, saturates */
     uint8_t reset_syncs;     /* SYNCs since a fault reset began, saturates; 0 = none */
+    uint64_t reset_asked_us; /* of a drive that does not start: when the operator reset it last; 0 = not since it started */
     uint64_t reset_until_us; /* a request is valid until then; while it is carried out, bit 7 is set until then at most */
     uint64_t operating_us;   /* operation enabled since, 0 = not */
     uint64_t stopping_us;    /* quick stop since, 0 = not */

@@ -67,7 +67,7 @@ void cia402_axis_reset(cia402_drive_t drive)
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->warned_object = 0;
     if (self->phase == CIA402_REFUSED) {
-        self->is_reset_asked = self->trouble == CIA402_NO_START;
+        self->reset_asked_us = self->trouble == CIA402_NO_START ? drive.now_us : 0;
         self->is_reset_done = false;
         self->starts = 0;
         self->mutes = 0;

@@ -9,7 +9,8 @@
 #include "cia402_setup.h"
 #include "cia402_watch.h"
 
-#define OPERATIONAL_US 500000u /* and three heartbeats: after NMT start, until the first TPDO */
+#define OPERATIONAL_US 500000u   /* and three heartbeats: after NMT start, until the first TPDO */
+#define RESET_ASKED_US 20000000u /* a reset counts for so long */
 #define RESTARTS_MAX   2u
 #define NMT_START      0x01u
 #define NMT_PREOP      0x80u
@@ -142,6 +143,13 @@ static void start_node(cia402_drive_t drive)
     }
 }
 
+/* Who has reset it is still there. */
+static bool is_reset_due(cia402_drive_t drive)
+{
+    const uint64_t asked_us = drive.axis->reset_asked_us;
+    return asked_us != 0 && drive.now_us - asked_us < RESET_ASKED_US;
+}
+
 void cia402_start_configuring(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
@@ -149,8 +157,8 @@ void cia402_start_configuring(cia402_drive_t drive)
     case CIA402_SETUP_BUSY:
         break;
     case CIA402_SETUP_DONE:
-        if (self->is_reset_asked) {
-            self->is_reset_asked = false;
+        if (is_reset_due(drive)) {
+            self->reset_asked_us = 0;
             cia402_setup_begin(self, CIA402_JOB_RESET, (cia402_mode_t)self->setup.mode, drive.now_us);
             break;
         }

@@ -1002,6 +1002,28 @@ static void test_quirks_that_make_no_difference(void)
     }
 }
 
+/* A reset is for what is there now: a drive that comes back later is not reset by itself. */
+static void test_quirk_reset_of_a_drive_that_does_not_start_is_not_kept(void)
+{
+    config.is_reset_wanted = false;
+    for (unsigned n = 0; n < 200; n++) {
+        now_us += CYCLE_US;
+        canopen_drives_step(&twin, now_us);
+    }
+    twin.drive[4].node.drive.quirks = QUIRK_FAULT_BLOCKS;
+    canopen_drives_fault(&twin, 4, 0x3210);
+    (void)refusal_of(4);
+    twin.drive[4].node.is_cut = true;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    cycles(21000);
+    twin.drive[4].node.is_cut = false;
+    cycles(6000);
+    TEST_ASSERT_EQUAL_STRING("refused", report(4).phase);
+    TEST_ASSERT_EQUAL_UINT32(0, twin.drive[4].resets);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    await(DRIVE_DISABLED, 3000);
+}
+
 /* Whoever answers each request after 700 ms is not missing. */
 static void test_quirk_slow_answers_are_waited_for(void)
 {
@@ -3458,6 +3480,7 @@ int main(void)
     RUN_TEST(test_quirk_wrong_toggle_is_named_with_its_object);
     RUN_TEST(test_quirk_fault_reset_takes_as_long_as_the_drive_needs);
     RUN_TEST(test_quirk_fault_that_keeps_a_drive_from_starting_is_named_and_reset);
+    RUN_TEST(test_quirk_reset_of_a_drive_that_does_not_start_is_not_kept);
     RUN_TEST(test_quirk_homing_without_bit_10_ends_when_the_drive_stands);
     RUN_TEST(test_quirk_homing_that_does_not_end_is_named);
     RUN_TEST(test_twice_single_repeated_or_late_answers_are_none);
