@@ -394,27 +394,24 @@ static void inherit(eds_t *self)
     }
 }
 
-/* The rest of a line that is longer than the buffer. */
-static void skip_rest(FILE *in)
-{
-    int byte = 0;
-    do {
-        byte = fgetc(in);
-    } while (byte != '\n' && byte != EOF);
-}
-
 bool eds_read(eds_t *self, FILE *in, const char *name, FILE *errors)
 {
     char text[LINE_BYTES];
     reader_t reader = {.eds = self, .name = name, .errors = errors};
     *self = (eds_t){.object = NULL};
+    bool is_rest = false; /* of a comment that is longer than the buffer */
     while (!reader.is_bad && fgets(text, sizeof text, in) != NULL) {
+        const bool is_whole = strchr(text, '\n') != NULL || feof(in);
+        if (is_rest) {
+            is_rest = !is_whole;
+            continue;
+        }
         const size_t mark = reader.line++ == 0 ? encoding_mark(text, strlen(text)) : 0;
         if (reader.line == 1 && encoding_is_utf16(text, strlen(text))) {
             complain(&reader, _("allowed: plain text (UTF-8)"), _("the file is UTF-16"));
-        } else if (strchr(text, '\n') == NULL && !feof(in) && text[mark + strspn(text + mark, BLANKS)] == ';') {
-            skip_rest(in);
-        } else if (strchr(text, '\n') == NULL && !feof(in)) {
+        } else if (!is_whole && text[mark + strspn(text + mark, BLANKS)] == ';') {
+            is_rest = true;
+        } else if (!is_whole) {
             complain(&reader, _("the line is too long"), text);
         } else {
             parse_line(&reader, text + mark);

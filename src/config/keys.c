@@ -445,7 +445,7 @@ const config_key_t config_keys[] = {
      .help = "yes: somebody has tried that each drive stops by itself when heaved is killed and when its cable is pulled; accept_without needs it"},
     {KEY("cia402", "allow_no_watchdog"), AT(cia402.is_no_watchdog_allowed), .type = &config_type_yes_no, .unit = "", .fallback = "no",
      .help = "accepts drives without any of these watchdogs, as older files have it; --check warns: write accept_without instead"},
-    {KEY("cia402", "csp_control_bits"), AT(cia402.csp_control_bits), .type = &config_type_mask, .unit = "", .fallback = "0", RANGE(0, 0x70),
+    {KEY("cia402", "csp_control_bits"), AT(cia402.csp_control_bits), .type = &config_type_mask, .unit = "", .fallback = "000", RANGE(0, 0x70),
      .help = "bits 4 to 6 of 6040h that a drive needs to follow set-points in mode = csp: 70 sets all three; most need none"},
     {KEY("cia402", "vendor_id"), AT(cia402.vendor_id), .type = &config_type_integer, .unit = "", .fallback = "0",
      RANGE(0, 4294967295), .help = "1018h:1 that every drive must have; 0 = any"},

@@ -315,7 +315,7 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
 static hv_status_t canraw_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
 {
     canraw_t *self = ctx;
-    (void)now_us; /* that of the poll before */
+    (void)now_us;                                /* that of the poll before */
     if (self->is_gone || !is_any_online(self)) { /* nothing to send; poll asks */
         return is_bus_lost(self) ? HV_ERR_IO : HV_OK;
     }

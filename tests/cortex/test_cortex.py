@@ -29,8 +29,8 @@ RUN_LIMIT_S = 300
 START = ("core", "CMakeFiles/heave_start.dir")
 # Processor: topics it plays, and what must not be exceeded, in bytes: what it takes, and some 5 % for the next change and another gcc. What is aimed at: docs/firmware.md.
 KINDS = {
-    "cortex-m3": (test_golden.TELLING, {"flash": 143 * 1024, "ram": 30 * 1024, "stack": 2560}),
-    "cortex-m0plus": (("mode-changes",), {"flash": 154 * 1024, "ram": 30 * 1024, "stack": 2816}),
+    "cortex-m3": (test_golden.TELLING, {"flash": 145 * 1024, "ram": 30 * 1024, "stack": 2560}),
+    "cortex-m0plus": (("mode-changes",), {"flash": 156 * 1024, "ram": 30 * 1024, "stack": 2816}),
 }
 
 
