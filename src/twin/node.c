@@ -88,36 +88,6 @@ static void keep_defects(objects_t *self, const objects_t *before)
     }
 }
 
-static bool has_number(const cia402_maps_t *maps, unsigned number)
-{
-    for (unsigned i = 0; i < maps->count; i++) {
-        if (maps->map[i].number == number) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* The drive has as many PDOs as others. Those whose numbers are higher take the places of its last ones that are not in use.
- * Returns the place of a PDO, from 1; 0: the drive has no such PDO. */
-unsigned node_pdo_place(const cia402_maps_t *maps, unsigned number)
-{
-    unsigned place = OBJECT_PDOS;
-    for (unsigned i = 0; i < maps->count; i++) {
-        if (maps->map[i].number <= OBJECT_PDOS) {
-            continue;
-        }
-        while (has_number(maps, place)) {
-            place--;
-        }
-        if (maps->map[i].number == number || place == number) {
-            return maps->map[i].number == number ? place : 0;
-        }
-        place--;
-    }
-    return number <= OBJECT_PDOS ? number : 0;
-}
-
 static void put_maps(node_t *self, uint16_t mappings, const cia402_maps_t *maps)
 {
     for (unsigned i = 0; i < maps->count; i++) {

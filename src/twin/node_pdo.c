@@ -9,6 +9,38 @@
 #define PDO_SHORT 0x8210u
 #define EVENT_US  1000 /* PDOs that tell of changes leave a gap */
 
+/* --- Which it has --- */
+
+static bool has_number(const cia402_maps_t *maps, unsigned number)
+{
+    for (unsigned i = 0; i < maps->count; i++) {
+        if (maps->map[i].number == number) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The drive has as many PDOs as others. Those whose numbers are higher take the places of its last ones that are not in use.
+ * Returns the place of a PDO, from 1; 0: the drive has no such PDO. */
+unsigned node_pdo_place(const cia402_maps_t *maps, unsigned number)
+{
+    unsigned place = OBJECT_PDOS;
+    for (unsigned i = 0; i < maps->count; i++) {
+        if (maps->map[i].number <= OBJECT_PDOS) {
+            continue;
+        }
+        while (has_number(maps, place)) {
+            place--;
+        }
+        if (maps->map[i].number == number || place == number) {
+            return maps->map[i].number == number ? place : 0;
+        }
+        place--;
+    }
+    return number <= OBJECT_PDOS ? number : 0;
+}
+
 /* --- What it sends --- */
 
 static uint8_t pack(const node_t *self, uint16_t mapping, uint8_t data[8])
